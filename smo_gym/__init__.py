@@ -1,0 +1,37 @@
+"""Sliding mode estimation and control of an uncertain cart pendulum, seen only through its position encoders.
+
+Importing registers two environments, each scalar and natively vectorised:
+
+- ``SMOPendulum-v0``: the article's plant (g = -9.8 m/s^2: theta = 0 hangs).
+- ``SMOPendulumUpright-v0``: g = +9.8 m/s^2, theta = 0 is upright.
+"""
+
+import gymnasium
+
+from .controllers import LQR, SlidingModeController
+from .kernels.batch import set_threads
+from .observers import Gains, Oracle, SlidingModeObserver
+from .plant import CartPendulum
+from .wrappers import ObserverWrapper, VectorObserverWrapper
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "LQR",
+    "CartPendulum",
+    "Gains",
+    "ObserverWrapper",
+    "Oracle",
+    "SlidingModeController",
+    "SlidingModeObserver",
+    "VectorObserverWrapper",
+    "set_threads",
+]
+
+for _id, _name in (("SMOPendulum-v0", "Pendulum"), ("SMOPendulumUpright-v0", "Upright")):
+    if _id not in gymnasium.registry:
+        gymnasium.register(
+            _id,
+            entry_point=f"smo_gym.envs.pendulum:{_name}Env",
+            vector_entry_point=f"smo_gym.envs.vector:{_name}VectorEnv",
+        )

@@ -1,0 +1,6 @@
+"""Control laws: one a file, all with Stable-Baselines3's ``predict``."""
+
+from .lqr import LQR
+from .sliding_mode import SlidingModeController
+
+__all__ = ["LQR", "SlidingModeController"]

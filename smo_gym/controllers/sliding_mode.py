@@ -1,0 +1,103 @@
+"""The article's sliding mode control with a periodic switching function, equations (49)-(50)."""
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..article import SMC_GAINS
+from ..kernels import kernel
+from ..kernels.elementary import sincos, tanh
+from ..validation import array, number
+from .feedback import estimates
+
+Array = NDArray[np.float64]
+
+
+class SlidingModeController:
+    """Sliding mode control of the estimated state, held over each control period.
+
+    ::
+
+        s = (k1 h + k3 h')^2 / 2 + (k2 theta + k4 theta')^2 / 2                  (50)
+        u = Z0 S(sin(pi / epsilon (s + lam integral of tanh(s))))                (49)
+
+    S is tanh with a slope (Remark 7). The integral is the law's state: it grows by ``dt tanh(s_k)`` after u_k is taken.
+
+    Args:
+        k: (k1, k2, k3, k4), positive, shape (4,). Not printed in the article.
+        dt: control period in s.
+        slope: of the tanh that stands for sgn; ``math.inf`` for exact sgn. Not printed in the article.
+        Z0: amplitude in N (Table 6).
+        lam: weight of the integral (Table 6).
+        epsilon: period of the switching function (Table 6).
+
+    Raises:
+        ValueError: a gain is not positive or has a wrong shape.
+    """
+
+    def __init__(
+        self,
+        k: ArrayLike,
+        dt: float,
+        slope: float,
+        Z0: float = SMC_GAINS["Z0"],
+        lam: float = SMC_GAINS["lam"],
+        epsilon: float = SMC_GAINS["epsilon"],
+    ) -> None:
+        self.k = array("k", k, (4,))
+        if (self.k <= 0.0).any():
+            raise ValueError(f"k={self.k.tolist()} must be positive")
+        self.dt = number("dt", dt, above=0.0)
+        self.slope = slope if slope == math.inf else number("slope", slope, above=0.0)
+        self.Z0 = number("Z0", Z0, above=0.0)
+        self.lam = number("lam", lam, above=0.0)
+        self.epsilon = number("epsilon", epsilon, above=0.0)
+        steep = min(self.slope, 1e300)  # tanh(1e300 x) is sgn(x)
+        self._settings = np.array([*self.k, self.Z0, self.lam, math.pi / self.epsilon, steep, self.dt])
+
+    def predict(
+        self,
+        observation: Array,
+        state: tuple[Array, ...] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        """The force in N and the integral after it.
+
+        Args:
+            observation: (n, 6) or (6,), from an observer wrapper.
+            state: ``(integral,)`` with the integral of tanh(s), shape (n,); None at the start.
+            episode_start: slots whose integral starts at 0, shape (n,).
+            deterministic: the law knows no other way.
+
+        Returns:
+            The force (n, 1), or (1,) for one observation, and the state for the next call.
+
+        Raises:
+            ValueError: the observation does not end in the four entries of xhat.
+        """
+        xhat = np.atleast_2d(estimates(observation))
+        n = len(xhat)
+        integral = np.zeros(n) if state is None else state[0].copy()
+        if episode_start is not None:
+            integral[np.broadcast_to(episode_start, n)] = 0.0
+        u = np.empty((n, 1))
+        _switch(xhat, integral, self._settings, u)
+        return (u if observation.ndim == 2 else u[0]), (integral,)
+
+    def __repr__(self) -> str:
+        return f"SlidingModeController(k={self.k.tolist()}, dt={self.dt}, slope={self.slope}, Z0={self.Z0}, lam={self.lam}, epsilon={self.epsilon})"
+
+
+@kernel
+def _switch(xhat: Array, integral: Array, settings: Array, u: Array) -> None:
+    k1, k2, k3, k4, Z0, lam, per_epsilon, slope, dt = settings
+    for i in range(len(integral)):
+        h, theta, v, omega = xhat[i, 0], xhat[i, 1], xhat[i, 2], xhat[i, 3]
+        cart = k1 * h + k3 * v
+        rod = k2 * theta + k4 * omega
+        s = 0.5 * cart * cart + 0.5 * rod * rod
+        sin, _ = sincos(per_epsilon * (s + lam * integral[i]))
+        u[i, 0] = Z0 * tanh(slope * sin)
+        integral[i] += dt * tanh(s)

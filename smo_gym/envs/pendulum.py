@@ -1,0 +1,149 @@
+"""``SMOPendulum-v0`` and ``SMOPendulumUpright-v0``, one plant at a time."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from numpy.typing import NDArray
+
+from ..validation import unknown
+from .task import HANGING, UPRIGHT, Stepper, Task, applied_force
+
+Array = NDArray[np.float64]
+RESET_OPTIONS = ("state", "params")
+
+
+class PendulumEnv(gymnasium.Env[Array, Array]):
+    """A cart pendulum whose parameters are uncertain and of which only the positions are measured.
+
+    ## Description
+
+    A cart on a track carries a rod with a bob at its end; a force moves the cart. Every episode draws its own plant:
+    cart mass, bob mass and rod length are each scaled by U(1 - x, 1 + x), and the agent is told neither. Encoders
+    measure where the cart and the rod are, not how fast they move. The goal is to bring both to rest at zero.
+
+    `SMOPendulum-v0` is the article's plant, with its g = -9.8 m/s^2: theta = 0 is the *hanging* equilibrium.
+    `SMOPendulumUpright-v0` has g = +9.8 m/s^2: theta = 0 is upright and unstable.
+
+    ## Action Space
+
+    `Box(-force_limit, force_limit, (1,), float64)`: the force on the cart in N. Forces beyond the limit are clipped, as
+    a saturated actuator would.
+
+    | Num | Action | Min | Max | Unit |
+    |-----|--------|-----|-----|------|
+    | 0 | force F on the cart | -30 | 30 | N |
+
+    ## Observation Space
+
+    `Box(-inf, inf, (2,), float64)`: the encoders. theta is not wrapped, as an encoder counts on.
+
+    | Num | Observation | Min | Max | Unit |
+    |-----|-------------|-----|-----|------|
+    | 0 | cart position h | -inf | inf | m |
+    | 1 | rod angle theta from the equilibrium | -inf | inf | rad |
+
+    :class:`smo_gym.ObserverWrapper` appends an estimate of the whole state.
+
+    ## Rewards
+
+    `-control_period (q . x^2 + r F^2)` with q = (1, 1, 0.1, 0.1) on (h, theta, h', theta') and r = 0.001, x at the end of the
+    control period; 100 less when the episode terminates. See :class:`~smo_gym.envs.task.Reward`.
+
+    ## Starting State
+
+    Drawn from the box `initial_state`: by default the one that the four cases of the article's Table 5 span, h and theta
+    in [-1, 1], h' = 0.1, theta' = 0.01; upright, theta in [-0.2, 0.2] and the rest zero.
+
+    ## Episode End
+
+    Termination: the cart leaves the track (`|h| > track_limit`), the rod falls (`|theta| > angle_limit`; pi/2 upright, no
+    limit hanging) or the state is not finite. Truncation: after `horizon` seconds. Reaching the goal ends nothing.
+
+    ## Information
+
+    At every step, with the same keys: `state` (4,) and `params` [M_c, m, l, g] (4,), the truth; `force`, what the
+    actuator applied; `samples` (substeps, 2), the encoders at each sampling instant of the control period just run.
+
+    ## Arguments
+
+    | Argument | Default | Meaning |
+    |----------|---------|---------|
+    | `control_period` | 0.02 | s; the force is held over it; a whole multiple of `dt` |
+    | `dt` | 0.001 | s; Runge-Kutta step of the plant and sampling period of the encoders |
+    | `params` | Table 2 | nominal plant: :class:`smo_gym.CartPendulum`, or a mapping of `cart_mass, bob_mass, rod_length, gravity` |
+    | `uncertainty` | 0.1 | x in [0, 1) |
+    | `initial_state` | see above | one state (4,) or a box (2, 4) of [low, high] |
+    | `force_limit` | 30 | N; None for no limit |
+    | `track_limit` | 5 | m; None for no limit |
+    | `angle_limit` | None | rad; None for no limit |
+    | `horizon` | 35 | s |
+    | `reward` | see above | weights: a mapping with `q`, `r`, `failure` |
+    | `render_mode` | None | no mode yet |
+
+    `reset(options={"state": ..., "params": ...})` replays one exact case; what is not given is drawn.
+
+    Raises:
+        ValueError: an option is unknown or its value is not allowed; an action of another shape or not finite.
+        gymnasium.error.ResetNeeded: `step` before `reset` or after the end of an episode.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 50}  # type: ignore[misc]
+    defaults: ClassVar[Task] = HANGING
+
+    def __init__(self, render_mode: str | None = None, **options: Any) -> None:
+        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
+            raise ValueError(f"render_mode={render_mode!r} must be None")
+        self.render_mode = render_mode
+        self.task = Task.of(options, self.defaults)
+        self.observation_space = self.task.observation_space
+        self.action_space = self.task.action_space
+        self._stepper = Stepper(self.task)
+        self._steps_left = 0
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
+        """Draw a plant and an initial state, or take them from ``options``."""
+        options = options or {}
+        for name in options:
+            if name not in RESET_OPTIONS:
+                raise ValueError(unknown("reset option", name, RESET_OPTIONS))
+        super().reset(seed=seed)
+        params, x = self.task.case(self.task.draw(self.np_random), options)
+        self._x, self._params = x[:, None], params[:, None]
+        self._steps_left = self.task.steps
+        samples = np.repeat(x[None, :2], self._stepper.substeps, axis=0)
+        return x[:2].copy(), self._info(samples, 0.0)
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Hold the force over one control period."""
+        if self._steps_left == 0:
+            raise ResetNeeded("the episode has not begun or is over: call reset() before step()")
+        u = applied_force(np.asarray(action)[None], 1, self.task.force_limit)
+        samples, reward, failed = self._stepper.step(self._x, self._params, u)
+        terminated = bool(failed[0])
+        self._steps_left -= 1
+        truncated = self._steps_left == 0 and not terminated
+        if terminated:
+            self._steps_left = 0
+        info = self._info(samples[:, :, 0], float(u[0]))
+        return self._x[:2, 0].copy(), float(reward[0]), terminated, truncated, info
+
+    def _info(self, samples: Array, force: float) -> dict[str, Any]:
+        return {
+            "state": self._x[:, 0].copy(),
+            "params": self._params[:, 0].copy(),
+            "force": force,
+            "samples": samples,
+        }
+
+
+class UprightEnv(PendulumEnv):
+    """``SMOPendulumUpright-v0``: :class:`PendulumEnv` with g = +9.8 m/s^2, so that theta = 0 is unstable.
+
+    It starts from ``|theta| <= 0.2`` at rest in the middle of the track and ends beyond ``|theta| = pi/2``.
+    """
+
+    defaults = UPRIGHT

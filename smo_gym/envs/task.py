@@ -1,0 +1,218 @@
+"""What an episode of the pendulum is: options, draws, reward and end. Both environments are made of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import ArrayLike, NDArray
+
+from ..kernels import kernel
+from ..plant import CartPendulum, advance
+from ..validation import array, limit, multiple, number, unknown
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Reward:
+    """Weights of the quadratic reward (all chosen).
+
+    ``r = -control_period (q . x^2 + r u^2) - failure [terminated]`` with x at the end of the control period: minus the
+    cost an LQR with Q = diag(q) and R = r minimises, and a penalty for leaving the track or falling, large enough
+    that failing early never pays.
+
+    Args:
+        q: weights of h^2, theta^2, h'^2, theta'^2 in 1/s per unit squared, shape (4,).
+        r: weight of u^2 in 1/(s N^2).
+        failure: penalty for a terminated episode.
+
+    Raises:
+        ValueError: a weight is negative or not finite.
+    """
+
+    q: tuple[float, float, float, float] = (1.0, 1.0, 0.1, 0.1)
+    r: float = 1e-3
+    failure: float = 100.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", tuple(array("reward q", self.q, (4,)).tolist()))
+        for name in ("r", "failure"):
+            object.__setattr__(self, name, number(f"reward {name}", getattr(self, name)))
+        if min(*self.q, self.r, self.failure) < 0.0:
+            raise ValueError(f"{self} must have weights of at least 0")
+
+    @classmethod
+    def of(cls, reward: Reward | Mapping[str, Any] | None) -> Reward:
+        """Weights from weights, a mapping of field names or None (the defaults)."""
+        if isinstance(reward, Reward):
+            return reward
+        known = [f.name for f in fields(cls)]
+        for name in reward or {}:
+            if name not in known:
+                raise ValueError(unknown("reward weight", name, known))
+        return cls(**(reward or {}))
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Options of the environments; :class:`~smo_gym.envs.pendulum.PendulumEnv` says what each means."""
+
+    control_period: float = 0.02
+    dt: float = 0.001
+    params: CartPendulum = field(default_factory=CartPendulum)
+    uncertainty: float = 0.1
+    initial_state: Any = ((-1.0, -1.0, 0.1, 0.01), (1.0, 1.0, 0.1, 0.01))
+    force_limit: float | None = 30.0
+    track_limit: float | None = 5.0
+    angle_limit: float | None = None
+    horizon: float = 35.0
+    reward: Reward = field(default_factory=Reward)
+
+    @classmethod
+    def of(cls, options: Mapping[str, Any], base: Task) -> Task:
+        """A task from keyword options; what they leave out, parts of ``params`` too, is taken from ``base``.
+
+        Raises:
+            ValueError: an unknown option, or a value that is not allowed.
+        """
+        known = [f.name for f in fields(cls)]
+        for name in options:
+            if name not in known:
+                raise ValueError(unknown("environment option", name, [*known, "render_mode"]))
+        return replace(base, **{**options, "params": CartPendulum.of(options.get("params"), base.params)})
+
+    def __post_init__(self) -> None:
+        set_ = object.__setattr__
+        set_(self, "dt", number("dt", self.dt, above=0.0))
+        multiple("control_period", self.control_period, "the integration step dt", self.dt)
+        multiple("horizon", self.horizon, "control_period", self.control_period)
+        set_(self, "params", CartPendulum.of(self.params))
+        set_(self, "reward", Reward.of(self.reward))
+        if not 0.0 <= number("uncertainty", self.uncertainty) < 1.0:
+            raise ValueError(f"uncertainty={self.uncertainty!r} must be a fraction in [0, 1)")
+        for name in ("force_limit", "track_limit", "angle_limit"):
+            set_(self, name, limit(name, getattr(self, name)))
+        low, high = self._box()
+        set_(self, "initial_state", (tuple(low.tolist()), tuple(high.tolist())))
+
+    def _box(self) -> tuple[Array, Array]:
+        shape = np.shape(self.initial_state)
+        if shape == (4,):
+            low = high = array("initial_state", self.initial_state, (4,))
+        elif shape == (2, 4):
+            low, high = array("initial_state", self.initial_state, (2, 4))
+        else:
+            raise ValueError(
+                f"initial_state has shape {shape}, it must be one state (4,) or a box of states [low, high], (2, 4)"
+            )
+        if (low > high).any():
+            raise ValueError(f"initial_state has low={low.tolist()} above high={high.tolist()}")
+        return low, high
+
+    @property
+    def substeps(self) -> int:
+        """Integration steps, and samples of the sensors, in one control period."""
+        return multiple("control_period", self.control_period, "dt", self.dt)
+
+    @property
+    def steps(self) -> int:
+        """Control periods in an episode."""
+        return multiple("horizon", self.horizon, "control_period", self.control_period)
+
+    @property
+    def observation_space(self) -> spaces.Box:
+        """[h, theta]: encoders count without end."""
+        return spaces.Box(-np.inf, np.inf, (2,), np.float64)
+
+    @property
+    def action_space(self) -> spaces.Box:
+        """The force in N."""
+        assert self.force_limit is not None
+        return spaces.Box(-self.force_limit, self.force_limit, (1,), np.float64)
+
+    def draw(self, rng: np.random.Generator) -> tuple[Array, Array]:
+        """An uncertain plant [M_c, m, l, g] and an initial state, each (4,), from an environment's own generator."""
+        params = self.params.draw(self.uncertainty, rng).as_array()
+        low, high = self.initial_state
+        return params, rng.uniform(low, high)
+
+    def case(self, drawn: tuple[Array, Array], options: Mapping[str, Any]) -> tuple[Array, Array]:
+        """The plant and initial state of one episode: what was drawn, or what reset options ask for instead.
+
+        Raises:
+            ValueError: an option has a value that is not allowed.
+        """
+        params, state = drawn
+        if options.get("params") is not None:
+            params = CartPendulum.of(options["params"], self.params).as_array()
+        if options.get("state") is not None:
+            state = array("options['state']", options["state"], (4,))
+        return params, state
+
+
+HANGING = Task()
+"""Defaults of SMOPendulum-v0: the article's plant; the initial states are the box that Table 5's four cases span."""
+
+UPRIGHT = Task(
+    params=CartPendulum(gravity=9.8),
+    initial_state=((0.0, -0.2, 0.0, 0.0), (0.0, 0.2, 0.0, 0.0)),
+    angle_limit=math.pi / 2,
+)
+"""Defaults of SMOPendulumUpright-v0."""
+
+
+def applied_force(action: ArrayLike, n: int, bound: float) -> Array:
+    """The force in N that the actuator applies, (n,): the actions (n, 1) clipped to its limit.
+
+    Raises:
+        ValueError: the shape is not (n, 1), or an action is not finite.
+    """
+    u = np.asarray(action, dtype=np.float64)
+    if u.shape != (n, 1):
+        raise ValueError(f"action has shape {u.shape}, it must have shape {(n, 1)}")
+    u = u[:, 0]
+    if not np.isfinite(u).all():
+        slot = int(np.flatnonzero(~np.isfinite(u))[0])
+        raise ValueError(f"action={u[slot]} (slot {slot}) must be finite")
+    return np.clip(u, -bound, bound)
+
+
+class Stepper:
+    """The compiled part of a step, with the task's numbers unpacked once."""
+
+    def __init__(self, task: Task) -> None:
+        self.dt, self.substeps = task.dt, task.substeps
+        weights = [*task.reward.q, task.reward.r]
+        self._settings = np.array(
+            [*(w * task.control_period for w in weights), task.reward.failure, task.track_limit, task.angle_limit]
+        )
+
+    def step(self, x: Array, params: Array, u: Array) -> tuple[Array, Array, Flags]:
+        """Advance the states ``x`` (4, n) in place by one control period.
+
+        Returns:
+            The samples (substeps, 2, n), the rewards (n,) and whether the episode failed (n,).
+        """
+        n = x.shape[1]
+        samples, reward, failed = np.empty((self.substeps, 2, n)), np.empty(n), np.empty(n, dtype=np.bool_)
+        advance(x, params, u, self.dt, samples)
+        _judge(x, u, self._settings, reward, failed)
+        return samples, reward, failed
+
+
+@kernel
+def _judge(x: Array, u: Array, settings: Array, reward: Array, failed: Flags) -> None:
+    q_h, q_theta, q_v, q_omega, r, penalty, track, angle = settings
+    for i in range(len(u)):
+        h, theta, v, omega = x[0, i], x[1, i], x[2, i], x[3, i]
+        cost = q_h * h * h + q_theta * theta * theta + q_v * v * v + q_omega * omega * omega + r * u[i] * u[i]
+        inside = abs(h) <= track and abs(theta) <= angle and math.isfinite(h + theta + v + omega)
+        failed[i] = not inside
+        cost = cost if math.isfinite(cost) else 0.0  # a diverged state has no cost, only the penalty
+        reward[i] = -cost if inside else -cost - penalty

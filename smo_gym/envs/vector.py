@@ -1,0 +1,210 @@
+"""The same environments natively vectorised: one compiled batch, one plant, generator and clock a slot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from ..validation import unknown
+from .pendulum import RESET_OPTIONS, PendulumEnv, UprightEnv
+from .task import Stepper, Task, applied_force
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
+    """``num_envs`` pendulums in one batch.
+
+    Slot i seeded with s gives, bit for bit, what the scalar environment seeded with s + i gives, whatever the number
+    of slots and threads. Options are those of :class:`~smo_gym.envs.pendulum.PendulumEnv`.
+
+    With ``autoreset_mode=DISABLED`` an ended slot holds still (state unchanged, reward 0, its flags stay) until
+    ``reset(options={"reset_mask": mask})`` starts it anew.
+
+    Args:
+        num_envs: number of slots.
+        render_mode: None.
+        autoreset_mode: "NextStep" (default), "SameStep" or "Disabled", or the enumeration's member.
+        **options: of the task.
+
+    Raises:
+        ValueError: an option is unknown or its value is not allowed; actions of another shape or not finite.
+        gymnasium.error.ResetNeeded: `step` before `reset`.
+    """
+
+    scalar: ClassVar[type[PendulumEnv]] = PendulumEnv
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        render_mode: str | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **options: Any,
+    ) -> None:
+        if not isinstance(num_envs, int) or num_envs < 1:
+            raise ValueError(f"num_envs={num_envs!r} must be a positive integer")
+        if render_mode is not None:
+            raise ValueError(f"render_mode={render_mode!r} must be None: a batch is not drawn")
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.task = Task.of(options, self.scalar.defaults)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.scalar.metadata, "autoreset_mode": self.autoreset_mode}
+        self.single_observation_space = self.task.observation_space
+        self.single_action_space = self.task.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._stepper = Stepper(self.task)
+        self._generators: list[np.random.Generator] = []
+        self._seeds: list[int] = []
+        self._x = np.zeros((4, num_envs))
+        self._params = np.repeat(self.task.params.as_array()[:, None], num_envs, axis=1)
+        self._steps_left = np.zeros(num_envs, dtype=np.int64)
+        self._terminated = np.zeros(num_envs, dtype=np.bool_)
+        self._truncated = np.zeros(num_envs, dtype=np.bool_)
+        self._everywhere = np.ones(num_envs, dtype=np.bool_)
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """One generator a slot."""
+        return tuple(self._generators)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """One seed a slot."""
+        return tuple(self._seeds)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Start all slots, or those of ``options["reset_mask"]``.
+
+        Args:
+            seed: an integer s seeds slot i with s + i; a sequence gives each slot its own.
+            options: ``state`` (4,) or (n, 4), ``params`` (4,), (n, 4) or a mapping, ``reset_mask`` (n,) of bool.
+        """
+        options = dict(options or {})
+        for name in options:
+            if name not in (*RESET_OPTIONS, "reset_mask"):
+                raise ValueError(unknown("reset option", name, (*RESET_OPTIONS, "reset_mask")))
+        mask = self._mask(options.pop("reset_mask", self._everywhere))
+        self._seed(seed, mask)
+        self._start(mask, options)
+        return self._observation(), self._info(self._still(), np.zeros(self.num_envs))
+
+    def step(self, actions: Array) -> tuple[Array, Array, Flags, Flags, dict[str, Any]]:  # type: ignore[override]
+        """Hold one force a slot over one control period."""
+        if not self._generators:
+            raise ResetNeeded("no episode has begun: call reset() before step()")
+        u = applied_force(actions, self.num_envs, self.task.force_limit)
+        over = self._terminated | self._truncated
+        waiting = bool(over.any())
+        if waiting:
+            held = self._x[:, over]
+            u[over] = 0.0
+        samples, reward, failed = self._stepper.step(self._x, self._params, u)
+        self._steps_left -= 1
+        terminated, truncated = failed, (self._steps_left == 0) & ~failed
+        if waiting:
+            reward[over] = 0.0
+            if self.autoreset_mode is AutoresetMode.DISABLED:
+                self._x[:, over] = held
+                terminated[over], truncated[over] = self._terminated[over], self._truncated[over]
+            else:  # the step after the end is the reset (NEXT_STEP)
+                terminated[over] = truncated[over] = False
+                self._start(over, {})
+            samples[:, :, over] = self._x[:2, over]
+        self._terminated, self._truncated = terminated, truncated
+        info = self._info(samples, u)
+        ended = terminated | truncated
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
+            info = self._restart(ended, info)
+        return self._observation(), reward, terminated.copy(), truncated.copy(), info
+
+    def _restart(self, ended: Flags, final: dict[str, Any]) -> dict[str, Any]:
+        """Start ended slots in the step that ended them (SAME_STEP): the last they gave goes to ``final_*``."""
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for i in np.flatnonzero(ended):
+            final_obs[i] = self._x[:2, i].copy()
+        final_info = {key: ended.copy() if key.startswith("_") else value for key, value in final.items()}
+        self._start(ended, {})
+        samples, force = final["samples"].copy(), final["force"].copy()
+        samples[ended] = self._x[:2, ended].T[:, None]
+        force[ended] = 0.0
+        return {
+            **self._info(samples.transpose(1, 2, 0), force),
+            "final_obs": final_obs,
+            "_final_obs": ended.copy(),
+            "final_info": final_info,
+            "_final_info": ended.copy(),
+        }
+
+    def _mask(self, mask: Any) -> Flags:
+        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise ValueError(f"options['reset_mask']={mask!r} must be a boolean array of shape ({self.num_envs},)")
+        if not mask.any():
+            raise ValueError("options['reset_mask'] must mark at least one slot")
+        return mask
+
+    def _seed(self, seed: int | Sequence[int | None] | None, mask: Flags) -> None:
+        n = self.num_envs
+        seeds = [seed + i for i in range(n)] if isinstance(seed, int) else [None] * n if seed is None else list(seed)
+        if len(seeds) != n:
+            raise ValueError(f"seed has {len(seeds)} entries for {n} slots")
+        fresh = not self._generators
+        if fresh:
+            self._generators, self._seeds = [None] * n, [-1] * n  # type: ignore[list-item]
+        for i, s in enumerate(seeds):
+            if fresh or (s is not None and mask[i]):
+                self._generators[i], self._seeds[i] = seeding.np_random(s)
+
+    def _start(self, mask: Flags, options: dict[str, Any]) -> None:
+        each = [{} for _ in range(self.num_envs)] if not options else self._each(options)
+        for i in np.flatnonzero(mask):
+            self._params[:, i], self._x[:, i] = self.task.case(self.task.draw(self._generators[i]), each[i])
+        self._steps_left[mask] = self.task.steps
+        self._terminated[mask] = self._truncated[mask] = False
+
+    def _each(self, options: dict[str, Any]) -> list[dict[str, Any]]:
+        """Options slot by slot: an array with a leading axis of slots is taken apart, anything else is for all."""
+        n = self.num_envs
+        return [
+            {name: value[i] if np.shape(value) == (n, 4) else value for name, value in options.items()} for i in range(n)
+        ]
+
+    def _still(self) -> Array:
+        """Samples (substeps, 2, n) of plants that have not moved."""
+        return np.repeat(self._x[None, :2], self._stepper.substeps, axis=0)
+
+    def _observation(self) -> Array:
+        return np.ascontiguousarray(self._x[:2].T)
+
+    def _info(self, samples: Array, force: Array) -> dict[str, Any]:
+        everywhere = self._everywhere
+        return {
+            "state": self._x.T.copy(),
+            "_state": everywhere,
+            "params": self._params.T.copy(),
+            "_params": everywhere,
+            "force": force,
+            "_force": everywhere,
+            "samples": samples.transpose(2, 0, 1),
+            "_samples": everywhere,
+        }
+
+
+class UprightVectorEnv(PendulumVectorEnv):
+    """The vector form of ``SMOPendulumUpright-v0``."""
+
+    scalar = UprightEnv

@@ -1,0 +1,75 @@
+"""Metrics of closed-loop runs, summed up step by step: memory does not grow with the length of a run."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import kernel
+from ..plant import STATE_NAMES
+
+Array = NDArray[np.float64]
+
+NAMES = (
+    "mse_h",  # mean of h^2 over the sampling instants, m^2
+    "mse_theta",  # mean of theta^2 over the sampling instants, rad^2
+    *(f"estimation_rms_{name}" for name in STATE_NAMES),  # of xhat - x over the control instants; NaN without observer
+    "effort",  # integral of u^2, N^2 s
+    "total_variation",  # sum of |u_k - u_{k-1}|, from u = 0, N
+    "peak_h",  # largest |h| at a sampling instant, m
+    "peak_theta",  # largest |theta| at a sampling instant, rad
+    "peak_force",  # largest |u|, N
+    "duration",  # until the horizon or the failure, s
+)
+_PREVIOUS_FORCE, _SAMPLES, _PERIODS = 11, 12, 13
+
+
+def start(n: int) -> Array:
+    """Sums of n runs at their beginning."""
+    return np.zeros((14, n))
+
+
+def add(sums: Array, info: dict[str, Any], observation: Array, over: NDArray[np.bool_]) -> None:
+    """Add one control period to the sums of all runs that are not over yet."""
+    estimated = observation.shape[1] == 6
+    _add(sums, info["samples"], info["state"], observation, estimated, info["force"], over)
+
+
+def finish(sums: Array, control_period: float) -> dict[str, Array]:
+    """Name to values (n,) in the units of :data:`NAMES`."""
+    periods = sums[_PERIODS]
+    values = [
+        *(sums[:2] / sums[_SAMPLES]),
+        *np.sqrt(sums[2:6] / periods),
+        sums[6] * control_period,
+        *sums[7:11],
+        periods * control_period,
+    ]
+    return dict(zip(NAMES, values, strict=True))
+
+
+@kernel
+def _add(
+    sums: Array, samples: Array, x: Array, observation: Array, estimated: bool, u: Array, over: NDArray[np.bool_]
+) -> None:
+    for i in range(len(u)):
+        if over[i]:
+            continue
+        for k in range(samples.shape[1]):
+            h, theta = samples[i, k, 0], samples[i, k, 1]
+            sums[0, i] += h * h
+            sums[1, i] += theta * theta
+            sums[8, i] = max(sums[8, i], abs(h))
+            sums[9, i] = max(sums[9, i], abs(theta))
+        for j in range(4):
+            error = observation[i, 2 + j] - x[i, j] if estimated else math.nan
+            sums[2 + j, i] += error * error
+        sums[6, i] += u[i] * u[i]
+        sums[7, i] += abs(u[i] - sums[_PREVIOUS_FORCE, i])
+        sums[10, i] = max(sums[10, i], abs(u[i]))
+        sums[_PREVIOUS_FORCE, i] = u[i]
+        sums[_SAMPLES, i] += samples.shape[1]
+        sums[_PERIODS, i] += 1.0

@@ -1,0 +1,126 @@
+"""One closed loop on a batch of plants, for every controller; metrics are accumulated as it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from ..envs.task import Task
+from . import metrics
+
+Array = NDArray[np.float64]
+
+
+class Agent(Protocol):
+    """Anything with Stable-Baselines3's ``predict``, on batches: LQR, SMC, a learned policy, your own."""
+
+    def predict(
+        self,
+        observation: Array,
+        state: tuple[Array, ...] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = False,
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        """Actions (n, action) for observations (n, observation), and the agent's own state for the next call."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Traces:
+    """Every ``every``-th control instant of a rollout, the start included."""
+
+    time: Array
+    """s, (m,)."""
+    x: Array
+    """True states, (m, 4, n)."""
+    xhat: Array
+    """Estimates, (m, 4, n); NaN where the environment has no observer."""
+    u: Array
+    """Force in N over the control period that ended at ``time``, (m, n)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rollout:
+    """What n runs gave."""
+
+    metrics: dict[str, Array]
+    """Metric name (:data:`smo_gym.evaluation.metrics.NAMES`) to values (n,), over each run's own duration."""
+    failed: NDArray[np.bool_]
+    """Runs that terminated: off the track, fallen or not finite, (n,)."""
+    traces: Traces | None
+
+
+def rollout(
+    env: VectorEnv[Array, Array, Array],
+    agent: Agent,
+    *,
+    seed: int | None = None,
+    options: Mapping[str, Any] | None = None,
+    trace_every: int | None = None,
+    progress: Callable[[int], object] = lambda steps: None,
+) -> Rollout:
+    """Run every slot of a vector environment from reset to its horizon.
+
+    A slot that fails is held and counted; the others go on.
+
+    Args:
+        env: a ``SMOPendulum`` vector environment, observed or not, with ``autoreset_mode=DISABLED``.
+        agent: chooses the force from the observation.
+        seed: of the environment's reset.
+        options: of the environment's reset, ``state`` and ``params`` to replay exact cases.
+        trace_every: keep every so many control instants; None keeps none, and memory does not grow with time.
+        progress: called with the number of control periods done since the last call.
+
+    Raises:
+        ValueError: the environment restarts slots by itself, or ``trace_every`` is no positive integer.
+    """
+    if env.metadata.get("autoreset_mode") is not AutoresetMode.DISABLED:
+        raise ValueError("a rollout is one episode a slot: make the environment with autoreset_mode='Disabled'")
+    if trace_every is not None and trace_every < 1:
+        raise ValueError(f"trace_every={trace_every!r} must be a positive integer")
+    task: Task = env.unwrapped.task  # type: ignore[attr-defined]
+    n = env.num_envs
+    observation, info = env.reset(seed=seed, options=dict(options or {}))
+    sums = metrics.start(n)
+    trace = _Recorder(trace_every, task, observation, info)
+    failed = np.zeros(n, dtype=np.bool_)
+    first, agent_state = np.ones(n, dtype=np.bool_), None
+    later = ~first
+    for k in range(1, task.steps + 1):
+        action, agent_state = agent.predict(observation, agent_state, first, True)
+        first = later
+        if failed.any():
+            action = np.where(failed[:, None], 0.0, action)
+        observation, _, terminated, _, info = env.step(action)
+        metrics.add(sums, info, observation, failed)
+        failed = terminated
+        trace.record(k, observation, info)
+        if k % 100 == 0:
+            progress(100)
+        if failed.all():
+            break
+    progress(task.steps % 100)
+    return Rollout(metrics.finish(sums, task.control_period), failed, trace.traces())
+
+
+class _Recorder:
+    def __init__(self, every: int | None, task: Task, observation: Array, info: dict[str, Any]) -> None:
+        self._every, self._period = every, task.control_period
+        self._rows: list[tuple[float, Array, Array, Array]] = []
+        self.record(0, observation, info)
+
+    def record(self, k: int, observation: Array, info: dict[str, Any]) -> None:
+        if self._every is not None and k % self._every == 0:
+            xhat = observation[:, 2:6] if observation.shape[1] == 6 else np.full((len(observation), 4), np.nan)
+            self._rows.append((k * self._period, info["state"].T, xhat.T, info["force"]))
+
+    def traces(self) -> Traces | None:
+        if self._every is None:
+            return None
+        time, x, xhat, u = (np.array(column) for column in zip(*self._rows, strict=True))
+        return Traces(time, x, xhat, u)

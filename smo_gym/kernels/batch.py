@@ -1,0 +1,87 @@
+"""A batch of slots: blocks of lanes in a flat workspace, and threads over blocks.
+
+The public arrays are (rows, n), one row a quantity. A kernel copies ``LANES`` slots of each row into a workspace where
+row r starts at ``r * LANES``. All its accesses are then constant offsets into one array, so the compiler proves without
+run-time checks that lanes are independent and vectorises the loop over them.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import inlined
+
+LANES = 64
+# Below this many microseconds of work for one core, waking a second thread costs more than it saves.
+_WORTH_A_THREAD = 150.0
+
+
+@inlined
+def load(work: NDArray[np.float64], row: int, rows: NDArray[np.float64], first: int, lanes: int) -> None:
+    """Copy ``lanes`` slots from slot ``first`` on of a (rows, n) array into the workspace's rows from ``row`` on."""
+    for r in range(rows.shape[0]):
+        target, source = work[(row + r) * LANES :], rows[r, first:]
+        for i in range(lanes):
+            target[i] = source[i]
+
+
+@inlined
+def store(work: NDArray[np.float64], row: int, rows: NDArray[np.float64], first: int, lanes: int) -> None:
+    """The way back of :func:`load`."""
+    for r in range(rows.shape[0]):
+        source, target = work[(row + r) * LANES :], rows[r, first:]
+        for i in range(lanes):
+            target[i] = source[i]
+
+
+class _Pool:
+    """Worker threads, made at first need; a forked child starts without any."""
+
+    def __init__(self) -> None:
+        self.threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        self.executor: ThreadPoolExecutor | None = None
+
+    def drop(self) -> None:
+        self.executor = None
+
+    def get(self) -> ThreadPoolExecutor:
+        if self.executor is None:
+            self.executor = ThreadPoolExecutor(self.threads, thread_name_prefix="smo_gym")
+        return self.executor
+
+
+_pool = _Pool()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.drop)
+
+
+def set_threads(threads: int) -> None:
+    """Use at most this many threads for large batches (default: all cores that the process may use).
+
+    Results do not depend on it.
+
+    Raises:
+        ValueError: ``threads`` is no positive integer.
+    """
+    if not isinstance(threads, int) or threads < 1:
+        raise ValueError(f"threads={threads!r} must be a positive integer")
+    _pool.threads = threads
+    _pool.drop()
+
+
+def for_slots(kernel: Callable[..., None], n: int, microseconds_a_slot: float, *args: Any) -> None:
+    """Run ``kernel(start, stop, *args)`` over slots 0 to n, in threads of whole blocks where the work is worth it."""
+    blocks = -(-n // LANES)
+    threads = min(_pool.threads, blocks)
+    if threads == 1 or n * microseconds_a_slot < _WORTH_A_THREAD:
+        kernel(0, n, *args)
+        return
+    bounds = [min(n, LANES * (blocks * k // threads)) for k in range(threads + 1)]
+    others = [_pool.get().submit(kernel, a, b, *args) for a, b in zip(bounds[1:-1], bounds[2:], strict=True)]
+    kernel(bounds[0], bounds[1], *args)
+    for other in others:
+        other.result()

@@ -1,0 +1,31 @@
+"""The equations of motion, the only place where they stand in code."""
+
+from . import inlined
+from .elementary import sincos
+
+
+@inlined
+def drift_and_gain(
+    theta: float, omega: float, M_c: float, m: float, l: float, g: float
+) -> tuple[float, float, float, float]:
+    """``f2 = (f_h, f_theta)`` of equation (12) and ``g2 = (g_h, g_theta)`` of (18): X2' = f2(x) + g2(x) u.
+
+    The four denominators are one, ``l (M_c + m sin^2 theta)``, up to a factor l.
+    """
+    sin, cos = sincos(theta)
+    per = 1.0 / (l * (M_c + m * sin * sin))
+    centrifugal = m * l * omega * omega * sin
+    f_h = (centrifugal - m * g * sin * cos) * l * per
+    f_theta = ((M_c + m) * g * sin - centrifugal * cos) * per
+    return f_h, f_theta, l * per, -cos * per
+
+
+@inlined
+def plant(
+    x: tuple[float, float, float, float], s: float, inputs: tuple[float, float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """x' = f(x) + g(x) u, equations (3)-(6) and (8), for ``inputs = (u, M_c, m, l, g)``."""
+    _, theta, v, omega = x
+    u, M_c, m, l, g = inputs
+    f_h, f_theta, g_h, g_theta = drift_and_gain(theta, omega, M_c, m, l, g)
+    return v, omega, f_h + g_h * u, f_theta + g_theta * u

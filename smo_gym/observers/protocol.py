@@ -1,0 +1,48 @@
+"""What an observer is given and what it must answer."""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Period(NamedTuple):
+    """One control period of n slots as a real observer sees it, and the truth for an oracle."""
+
+    y: Array
+    """Measured positions [h, theta] at its start, (2, n)."""
+    samples: Array
+    """Measured positions at each later sampling instant, the last one at its end, (samples, 2, n)."""
+    u: Array
+    """The force in N that was applied, (n,)."""
+    truth: Array
+    """The plants' states at its end, (4, n). Only an oracle reads it."""
+
+
+class Estimator(Protocol):
+    """An observer at work on n slots."""
+
+    xhat: Array
+    """The estimates [h, theta, h', theta'], (4, n)."""
+
+    def reset(self, slots: NDArray[np.bool_]) -> None:
+        """Start the marked slots, (n,), anew."""
+        ...
+
+    def update(self, period: Period) -> None:
+        """Bring ``xhat`` to the end of a control period."""
+        ...
+
+
+class Observer(Protocol):
+    """The settings of an observer, constant while it works."""
+
+    def start(self, n: int, dt: float, force: float) -> Estimator:
+        """An estimator of n slots for positions sampled every ``dt`` seconds and forces of at most ``force`` N.
+
+        Raises:
+            ValueError: the observer cannot work with these.
+        """
+        ...

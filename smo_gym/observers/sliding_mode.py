@@ -1,0 +1,313 @@
+"""The article's sliding mode observer, equations (27)-(35)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..article import OBSERVER_GAINS
+from ..kernels import inlined, kernel
+from ..kernels.batch import LANES, for_slots, load, store
+from ..kernels.cart_pendulum import drift_and_gain
+from ..kernels.elementary import tanh
+from ..kernels.rk4 import rk4
+from ..plant import CartPendulum
+from ..validation import array, choice, multiple, number, unknown
+from .protocol import Period
+
+Array = NDArray[np.float64]
+_MICROSECONDS_A_STEP = 0.035
+# tanh(k e) with a slope this steep is sgn(e) for every e that is not 0, and 0 for e = 0.
+_EXACT = 1e300
+# RK4 is stable for x' = -r x up to r dt = 2.785 (the real root of 1 + z/2 + z^2/6 + z^3/24).
+_RK4_LIMIT = 2.785
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Observer gains of equations (27)-(29), named as in Table 3.
+
+    Args:
+        m1: (m_11, m_12) in m/s and rad/s, the sliding gains of the positions.
+        beta_1: (beta_{1,1}, beta_{2,1}) in m/s^2 and rad/s^2, the constant part of the sliding gains of the velocities.
+        beta_2: (beta_{1,2}, beta_{2,2}) in 1/kg and 1/(kg m), their part in |u|: the compensation of the input
+            uncertainty (Remark 3).
+
+    Raises:
+        ValueError: m1 is not positive, or a beta is negative.
+    """
+
+    m1: tuple[float, float]
+    beta_1: tuple[float, float]
+    beta_2: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            values = array(field.name, getattr(self, field.name), (2,))
+            if (values < 0.0).any() or (field.name == "m1" and (values == 0.0).any()):
+                allowed = "positive" if field.name == "m1" else "at least 0"
+                raise ValueError(f"{field.name}={values.tolist()} must be {allowed}")
+            object.__setattr__(self, field.name, tuple(values.tolist()))
+
+    @classmethod
+    def of(cls, gains: str | Gains | Mapping[str, ArrayLike]) -> Gains:
+        """Gains from gains, a column of Table 3 ("lqr" or "smc") or a mapping of field names.
+
+        Raises:
+            ValueError: an unknown column or field, or a value that is not allowed.
+        """
+        if isinstance(gains, Gains):
+            return gains
+        if isinstance(gains, str):
+            return cls(**OBSERVER_GAINS[choice("column of Table 3", gains, OBSERVER_GAINS)])
+        known = [field.name for field in fields(cls)]
+        for name in gains:
+            if name not in known:
+                raise ValueError(unknown("observer gain", name, known))
+        return cls(**gains)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, slots=True)
+class SlidingModeObserver:
+    """Estimates the state from sampled positions, the applied force, nominal parameters and gains.
+
+    ::
+
+        Xhat1' = m1 S(k_p (X1 - Xhat1))                                          (34)
+        Xhat2' = (beta_1 + beta_2 |u|) S(k_v (psi2 - Xhat2)) + f20(xhat) + g20(xhat) u   (35), (29)
+        psi2   = {Xhat1'}_eq                                                     (33)
+
+    S is ``tanh`` (Remark 7) or, with an infinite slope, the exact sgn. With tanh the injection Xhat1' is continuous
+    and is its own equivalent value. Exact sgn makes it bang-bang; the equivalent value operator is then a low-pass
+    with a time constant, driven by the mean injection of each step.
+
+    Over the sampling period that ends at sample k the observer uses u_{k-1} and the measurement on the straight line
+    between y_{k-1} and y_k, so xhat_k knows y_k and all forces before it.
+
+    Args:
+        gains: a :class:`Gains`, "lqr" or "smc" for a column of Table 3, or a mapping.
+        compensation: False sets beta_2 = 0 (Remark 3).
+        slopes: (k_p, k_v) of tanh in 1/m (1/rad) and s/m (s/rad); ``math.inf`` for exact sgn. The article prints no
+            slopes; the default is chosen, near what its LQR tables identify.
+        time_constant: of the low-pass for the equivalent value in s; 0 for none.
+        step: integration step in s, which divides the sampling period; None for the sampling period itself.
+        xhat0: initial estimate, shape (4,).
+        model: nominal plant (Table 2).
+
+    Raises:
+        ValueError: a value is not allowed, or k_p is infinite without a time constant.
+    """
+
+    gains: Gains | str | Mapping[str, ArrayLike] = "lqr"
+    compensation: bool = True
+    slopes: tuple[float, float] = (12.0, 12.0)
+    time_constant: float = 0.0
+    step: float | None = None
+    xhat0: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    model: CartPendulum = CartPendulum()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gains", Gains.of(self.gains))
+        object.__setattr__(self, "model", CartPendulum.of(self.model))
+        object.__setattr__(self, "xhat0", tuple(array("xhat0", self.xhat0, (4,)).tolist()))
+        if not isinstance(self.compensation, bool):
+            raise ValueError(f"compensation={self.compensation!r} must be True or False")
+        slopes = np.asarray(self.slopes, dtype=np.float64)
+        if slopes.shape != (2,) or not (slopes > 0.0).all():
+            raise ValueError(f"slopes={self.slopes!r} must be two positive numbers (math.inf for the exact sgn)")
+        object.__setattr__(self, "slopes", tuple(slopes.tolist()))
+        if number("time_constant", self.time_constant) < 0.0:
+            raise ValueError(f"time_constant={self.time_constant!r} must be at least 0")
+        if self.time_constant == 0.0 and math.isinf(self.slopes[0]):
+            raise ValueError(
+                "slopes[0]=inf (exact sgn) makes the injection bang-bang: psi2 needs a time_constant greater than 0"
+            )
+        if self.step is not None:
+            object.__setattr__(self, "step", number("step", self.step, above=0.0))
+
+    def largest_step(self, force: float) -> float:
+        """The largest step in s at which RK4 is stable inside both boundary layers while ``|u| <= force``.
+
+        Inside its layer tanh(k e) is k e, so the errors decay at the rates m1 k_p and (beta_1 + beta_2 |u|) k_v; RK4
+        wants rate times step below 2.785. An exact sgn has no layer and no such limit: there the step sets the chatter.
+        """
+        gains = self._gains
+        m1 = np.array(gains.m1)
+        m2 = np.array(gains.beta_1) + self.compensation * np.array(gains.beta_2) * force
+        rates = [m.max() * k for m, k in zip((m1, m2), self.slopes, strict=True) if math.isfinite(k)]
+        fastest = max(rates, default=0.0)
+        return _RK4_LIMIT / fastest if fastest > 0.0 else math.inf
+
+    def start(self, n: int, dt: float, force: float) -> _Bank:
+        """An estimator of n slots, all with these settings.
+
+        Raises:
+            ValueError: the step does not divide ``dt`` or is too large for the gains (with the largest that works).
+        """
+        return self.start_each([self] * n, dt, force)
+
+    @staticmethod
+    def start_each(observers: Sequence[SlidingModeObserver], dt: float, force: float) -> _Bank:
+        """An estimator whose slot i has the settings of ``observers[i]``.
+
+        Raises:
+            ValueError: as :meth:`start`; or the observers differ in step or model.
+        """
+        first = observers[0]
+        if any(o.step != first.step or o.model != first.model for o in observers):
+            raise ValueError("observers in one batch must have the same step and model")
+        distinct = {id(o): o for o in observers}
+        steps = {key: o._steps(dt, force) for key, o in distinct.items()}[id(first)]
+        columns = {key: o._column(dt / steps) for key, o in distinct.items()}
+        return _Bank(
+            xhat0=np.stack([o.xhat0 for o in observers], axis=1),
+            settings=np.ascontiguousarray(np.stack([columns[id(o)] for o in observers], axis=1)),
+            nominal=first.model.as_array(),
+            dt=dt,
+            steps=steps,
+        )
+
+    def _steps(self, dt: float, force: float) -> int:
+        """How many integration steps a sampling period has."""
+        step = dt if self.step is None else self.step
+        steps = multiple("sampling period", dt, "step", step)
+        largest = self.largest_step(force)
+        if step > largest:
+            raise ValueError(
+                f"step={step:g} s is too large for these gains and slopes with |u| up to {force:g} N: RK4 is stable up "
+                f"to {largest:.4g} s; the largest step that divides the sampling period is "
+                f"step={dt / math.ceil(dt / largest):.6g}"
+            )
+        return steps
+
+    def _column(self, step: float) -> Array:
+        """One slot's m1 (2), beta_1 (2), beta_2 (2), slopes (2) and the low-pass' share of new input a step, (9,)."""
+        gains = self._gains
+        beta_2 = gains.beta_2 if self.compensation else (0.0, 0.0)
+        alpha = -math.expm1(-step / self.time_constant) if self.time_constant else 0.0
+        return np.array([*gains.m1, *gains.beta_1, *beta_2, *(min(k, _EXACT) for k in self.slopes), alpha])
+
+    @property
+    def _gains(self) -> Gains:
+        assert isinstance(self.gains, Gains)
+        return self.gains
+
+
+class _Bank:
+    """Sliding mode observers at work, one a slot."""
+
+    def __init__(self, xhat0: Array, settings: Array, nominal: Array, dt: float, steps: int) -> None:
+        self._settings, self._nominal, self._dt, self._steps = settings, nominal, dt, steps
+        self._initial = np.concatenate([xhat0, np.zeros((2, xhat0.shape[1]))])  # rows xhat and psi2
+        self._state = self._initial.copy()
+
+    @property
+    def xhat(self) -> Array:
+        return self._state[:4]
+
+    def reset(self, slots: NDArray[np.bool_]) -> None:
+        self._state[:, slots] = self._initial[:, slots]
+
+    def update(self, period: Period) -> None:
+        for_slots(
+            _observe,
+            self._state.shape[1],
+            _MICROSECONDS_A_STEP * self._steps * len(period.samples),
+            self._state,
+            period.y,
+            period.samples,
+            period.u,
+            self._settings,
+            self._nominal,
+            self._steps,
+            self._dt,
+        )
+
+
+@inlined
+def _estimate(
+    xhat: tuple[float, float, float, float], s: float, inputs: tuple[float, ...]
+) -> tuple[float, float, float, float]:
+    """xhat' of (34)-(35), the measurement on the line between two samples."""
+    h, theta, v, omega = xhat
+    (h0, theta0, h1, theta1, u, m1_h, m1_theta, m2_h, m2_theta, k_p, k_v, held, psi_h, psi_theta, M_c, m, l, g) = inputs
+    h_dot = m1_h * tanh(k_p * (h0 + s * (h1 - h0) - h))
+    theta_dot = m1_theta * tanh(k_p * (theta0 + s * (theta1 - theta0) - theta))
+    psi_h = psi_h if held > 0.0 else h_dot
+    psi_theta = psi_theta if held > 0.0 else theta_dot
+    f_h, f_theta, g_h, g_theta = drift_and_gain(theta, omega, M_c, m, l, g)
+    v_dot = m2_h * tanh(k_v * (psi_h - v)) + (f_h + g_h * u)
+    omega_dot = m2_theta * tanh(k_v * (psi_theta - omega)) + (f_theta + g_theta * u)
+    return h_dot, theta_dot, v_dot, omega_dot
+
+
+@kernel
+def _observe(
+    start: int,
+    stop: int,
+    state: Array,
+    y: Array,
+    samples: Array,
+    u: Array,
+    settings: Array,
+    nominal: Array,
+    steps: int,
+    dt: float,
+) -> None:
+    """In place; rows of the workspace: state 0-5, two samples 6-9, force 10, settings 11-19."""
+    W = LANES
+    work = np.empty(20 * W)
+    force = u.reshape((1, u.size))
+    M_c, m, l, g = nominal
+    h = dt / steps
+    for first in range(start, stop, LANES):
+        lanes = min(LANES, stop - first)
+        load(work, 0, state, first, lanes)
+        load(work, 8, y, first, lanes)
+        load(work, 10, force, first, lanes)
+        load(work, 11, settings, first, lanes)
+        for k in range(samples.shape[0]):
+            for i in range(2 * W):
+                work[6 * W + i] = work[8 * W + i]
+            load(work, 8, samples[k], first, lanes)
+            for j in range(steps):
+                a, b = j / steps, (j + 1) / steps
+                for i in range(lanes):
+                    h0, theta0 = work[6 * W + i], work[7 * W + i]
+                    dh, dtheta = work[8 * W + i] - h0, work[9 * W + i] - theta0
+                    force_i, alpha = work[10 * W + i], work[19 * W + i]
+                    size = abs(force_i)
+                    xhat = (work[i], work[W + i], work[2 * W + i], work[3 * W + i])
+                    inputs = (
+                        h0 + a * dh,
+                        theta0 + a * dtheta,
+                        h0 + b * dh,
+                        theta0 + b * dtheta,
+                        force_i,
+                        work[11 * W + i],
+                        work[12 * W + i],
+                        work[13 * W + i] + work[15 * W + i] * size,
+                        work[14 * W + i] + work[16 * W + i] * size,
+                        work[17 * W + i],
+                        work[18 * W + i],
+                        alpha,
+                        work[4 * W + i],
+                        work[5 * W + i],
+                        M_c,
+                        m,
+                        l,
+                        g,
+                    )
+                    x0, x1, x2, x3 = rk4(_estimate, xhat, inputs, h)
+                    # the low-pass sees the mean injection over the step
+                    work[4 * W + i] += alpha * ((x0 - xhat[0]) / h - work[4 * W + i])
+                    work[5 * W + i] += alpha * ((x1 - xhat[1]) / h - work[5 * W + i])
+                    work[i] = x0
+                    work[W + i] = x1
+                    work[2 * W + i] = x2
+                    work[3 * W + i] = x3
+        store(work, 0, state, first, lanes)

@@ -1,0 +1,183 @@
+"""The cart pendulum: parameters, uncertainty, equations (1)-(25) on batches, energy and linearisation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .kernels import kernel
+from .kernels.batch import LANES, for_slots, load, store
+from .kernels.cart_pendulum import drift_and_gain
+from .kernels.cart_pendulum import plant as _plant
+from .kernels.rk4 import rk4
+from .validation import array, number, unknown
+
+Array = NDArray[np.float64]
+STATE_NAMES = ("h", "theta", "h_dot", "theta_dot")
+MICROSECONDS_A_STEP = 0.015
+"""Time of one Runge-Kutta step of one slot, to decide when a second thread is worth waking."""
+
+
+@dataclass(frozen=True, slots=True)
+class CartPendulum:
+    """Parameters of the cart pendulum, by default the article's Table 2.
+
+    The state is x = [h, theta, h', theta'] in m, rad, m/s, rad/s and the input u = F in N. theta is measured from the
+    upward vertical for ``gravity > 0``. The article prints g = -9.8 m/s^2 (Table 2), which turns the picture over: theta = 0 is
+    then the *hanging*, stable equilibrium.
+
+    Args:
+        cart_mass: M_c in kg.
+        bob_mass: m in kg.
+        rod_length: l in m.
+        gravity: g in m/s^2, of either sign.
+
+    Raises:
+        ValueError: a mass or the length is not positive, or a value is not finite.
+    """
+
+    cart_mass: float = 3.5
+    bob_mass: float = 0.32
+    rod_length: float = 0.44
+    gravity: float = -9.8
+
+    def __post_init__(self) -> None:
+        for name in ("cart_mass", "bob_mass", "rod_length"):
+            object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
+        object.__setattr__(self, "gravity", number("gravity", self.gravity))
+
+    @classmethod
+    def of(
+        cls, params: CartPendulum | Mapping[str, float] | ArrayLike | None, base: CartPendulum | None = None
+    ) -> CartPendulum:
+        """A plant from a plant, a mapping of field names, an array [M_c, m, l, g] or None.
+
+        What a mapping or None leaves out is taken from ``base`` (Table 2 by default).
+
+        Raises:
+            ValueError: an unknown field, a wrong shape or a value that is not allowed.
+        """
+        base = base or cls()
+        if params is None:
+            return base
+        if isinstance(params, CartPendulum):
+            return params
+        if isinstance(params, Mapping):
+            known = [field.name for field in fields(cls)]
+            for name in params:
+                if name not in known:
+                    raise ValueError(unknown("plant parameter", name, known))
+            return replace(base, **params)
+        return cls(*array("params", params, (4,)).tolist())
+
+    def as_array(self) -> Array:
+        """[M_c, m, l, g], shape (4,)."""
+        return np.array([self.cart_mass, self.bob_mass, self.rod_length, self.gravity])
+
+    def as_dict(self) -> dict[str, float]:
+        """The fields by name, as :meth:`of` takes them."""
+        return asdict(self)
+
+    def perturbed(self, delta: ArrayLike) -> CartPendulum:
+        """The plant whose M_c, m and l are each multiplied by ``1 + delta``, shape (3,); g is known."""
+        M_c, m, l = self.as_array()[:3] * (1.0 + array("delta", delta, (3,)))
+        return CartPendulum(M_c, m, l, self.gravity)
+
+    def draw(self, uncertainty: float, rng: np.random.Generator) -> CartPendulum:
+        """One uncertain plant: M_c, m and l each times U(1 - x, 1 + x) (section 6, x = ``uncertainty`` in [0, 1))."""
+        return self.perturbed(uncertainty * rng.uniform(-1.0, 1.0, 3))
+
+    def energy(self, x: ArrayLike) -> Array:
+        """Kinetic and potential energy in J of states (4, ...): the integrand of equation (53).
+
+        ``(M_c + m) h'^2 / 2 + m l^2 theta'^2 / 2 + m l h' theta' cos theta + m g l cos theta``
+        """
+        _, theta, v, omega = np.asarray(x, dtype=np.float64)
+        M_c, m, l, g = self.as_array()
+        kinetic = 0.5 * (M_c + m) * v**2 + 0.5 * m * l**2 * omega**2 + m * l * v * omega * np.cos(theta)
+        return np.asarray(kinetic + m * g * l * np.cos(theta))
+
+    def drift(self, x: ArrayLike) -> Array:
+        """f(x) of equation (10) for states (4, n) or (4,), of the same shape."""
+        return self._split(x)[0]
+
+    def gain(self, x: ArrayLike) -> Array:
+        """g(x) of equations (16)-(18) for states (4, n) or (4,), of the same shape."""
+        return self._split(x)[1]
+
+    def _split(self, x: ArrayLike) -> tuple[Array, Array]:
+        states = np.asarray(x, dtype=np.float64)
+        batch = np.ascontiguousarray(states.reshape(4, -1))
+        f, g = np.empty_like(batch), np.empty_like(batch)
+        _drift_and_gain(batch, self.as_array(), f, g)
+        return f.reshape(states.shape), g.reshape(states.shape)
+
+    def linearise(self, theta: float = 0.0) -> tuple[Array, Array]:
+        """A (4, 4) and B (4, 1) of ``x' = A x + B u`` about an equilibrium, theta a multiple of pi and u = 0.
+
+        Raises:
+            ValueError: ``theta`` is no multiple of pi, hence no equilibrium without force.
+        """
+        sign = np.cos(number("theta", theta))
+        if abs(np.sin(theta)) > 1e-12:
+            raise ValueError(f"theta={theta!r} must be a multiple of pi: elsewhere gravity needs a force to balance it")
+        M_c, m, l, g = self.as_array()
+        A = np.zeros((4, 4))
+        A[0, 2] = A[1, 3] = 1.0
+        A[2, 1] = -m * g / M_c
+        A[3, 1] = sign * (M_c + m) * g / (M_c * l)
+        B = np.array([[0.0], [0.0], [1.0 / M_c], [-sign / (M_c * l)]])
+        return A, B
+
+
+def advance(x: Array, params: Array, u: Array, dt: float, samples: Array) -> None:
+    """Integrate plants in place over ``len(samples)`` Runge-Kutta steps with the force held.
+
+    Args:
+        x: states (4, n), overwritten by the states at the end.
+        params: [M_c, m, l, g] of each slot, (4, n).
+        u: force in N of each slot, (n,).
+        dt: step in s.
+        samples: (steps, 2, n), filled with the positions [h, theta] after each step.
+    """
+    for_slots(_advance, x.shape[1], MICROSECONDS_A_STEP * len(samples), x, params, u, dt, samples)
+
+
+@kernel
+def _advance(start: int, stop: int, x: Array, params: Array, u: Array, dt: float, samples: Array) -> None:
+    work = np.empty(9 * LANES)
+    force = u.reshape((1, u.size))
+    for first in range(start, stop, LANES):
+        lanes = min(LANES, stop - first)
+        load(work, 0, x, first, lanes)
+        load(work, 4, params, first, lanes)
+        load(work, 8, force, first, lanes)
+        for k in range(samples.shape[0]):
+            for i in range(lanes):
+                state = (work[i], work[LANES + i], work[2 * LANES + i], work[3 * LANES + i])
+                inputs = (
+                    work[8 * LANES + i],
+                    work[4 * LANES + i],
+                    work[5 * LANES + i],
+                    work[6 * LANES + i],
+                    work[7 * LANES + i],
+                )
+                h, theta, v, omega = rk4(_plant, state, inputs, dt)
+                work[i] = h
+                work[LANES + i] = theta
+                work[2 * LANES + i] = v
+                work[3 * LANES + i] = omega
+            store(work, 0, samples[k], first, lanes)
+        store(work, 0, x, first, lanes)
+
+
+@kernel
+def _drift_and_gain(x: Array, params: Array, f: Array, g: Array) -> None:
+    M_c, m, l, gravity = params
+    for i in range(x.shape[1]):
+        f[0, i], f[1, i] = x[2, i], x[3, i]
+        g[0, i] = g[1, i] = 0.0
+        f[2, i], f[3, i], g[2, i], g[3, i] = drift_and_gain(x[1, i], x[3, i], M_c, m, l, gravity)
