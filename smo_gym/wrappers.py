@@ -158,8 +158,10 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         """Run a control period and bring the estimates to its end."""
         y, reward, terminated, truncated, info = self.env.step(actions)
         ended = terminated | truncated
-        restarted = ended if self._mode is AutoresetMode.SAME_STEP else self._over
-        last = _at_the_end(info) if self._mode is AutoresetMode.SAME_STEP and ended.any() else info
+        same_step = self._mode is AutoresetMode.SAME_STEP
+        restarted = ended if same_step else self._over
+        any_restarted = np.count_nonzero(restarted) > 0
+        last = _at_the_end(info) if same_step and any_restarted else info
         period = Period(
             y=self._y,
             samples=np.ascontiguousarray(last["samples"].transpose(1, 2, 0)),
@@ -167,19 +169,21 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
             truth=np.ascontiguousarray(last["state"].T),
         )
         self._estimator.update(period)
-        if restarted.any():
-            if self._mode is AutoresetMode.SAME_STEP:
-                final_obs = info["final_obs"]
-                for i in np.flatnonzero(ended):
-                    final_obs[i] = np.concatenate([final_obs[i], self._estimator.xhat[:, i]])
-            if self._mode is not AutoresetMode.DISABLED:
-                self._estimator.reset(restarted)
+        if same_step and any_restarted:
+            final_obs = info["final_obs"]
+            for i in np.flatnonzero(ended):
+                final_obs[i] = np.concatenate([final_obs[i], self._estimator.xhat[:, i]])
+        if any_restarted and self._mode is not AutoresetMode.DISABLED:
+            self._estimator.reset(restarted)
         self._over = ended
         return self._observation(y), reward, terminated, truncated, info
 
     def _observation(self, y: Array) -> Array:
         self._y = np.ascontiguousarray(y.T)
-        return np.concatenate([y, self._estimator.xhat.T], axis=1)
+        observation = np.empty((len(y), 6))
+        observation[:, :2] = y
+        observation[:, 2:] = self._estimator.xhat.T
+        return observation
 
 
 def _with_model(observer: str | Observer, compensation: bool, settings: dict[str, Any], task: Task) -> Observer:

@@ -81,7 +81,7 @@ class SlidingModeController:
         n = len(xhat)
         integral = np.zeros(n) if state is None else state[0].copy()
         if episode_start is not None:
-            integral[np.broadcast_to(episode_start, n)] = 0.0
+            integral[np.atleast_1d(episode_start)] = 0.0
         u = np.empty((n, 1))
         _switch(xhat, integral, self._settings, u)
         return (u if observation.ndim == 2 else u[0]), (integral,)

@@ -173,14 +173,24 @@ def applied_force(action: ArrayLike, n: int, bound: float) -> Array:
     Raises:
         ValueError: the shape is not (n, 1), or an action is not finite.
     """
-    u = np.asarray(action, dtype=np.float64)
-    if u.shape != (n, 1):
-        raise ValueError(f"action has shape {u.shape}, it must have shape {(n, 1)}")
-    u = u[:, 0]
-    if not np.isfinite(u).all():
-        slot = int(np.flatnonzero(~np.isfinite(u))[0])
-        raise ValueError(f"action={u[slot]} (slot {slot}) must be finite")
-    return np.clip(u, -bound, bound)
+    wanted = np.asarray(action, dtype=np.float64)
+    if wanted.shape != (n, 1):
+        raise ValueError(f"action has shape {wanted.shape}, it must have shape {(n, 1)}")
+    u = np.empty(n)
+    slot = _saturate(wanted, bound, u)
+    if slot >= 0:
+        raise ValueError(f"action={wanted[slot, 0]} (slot {slot}) must be finite")
+    return u
+
+
+@kernel
+def _saturate(wanted: Array, bound: float, u: Array) -> int:
+    """Clip; the first slot whose action is not finite, or -1."""
+    for i in range(len(u)):
+        if not math.isfinite(wanted[i, 0]):
+            return i
+        u[i] = min(max(wanted[i, 0], -bound), bound)
+    return -1
 
 
 class Stepper:

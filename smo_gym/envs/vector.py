@@ -109,7 +109,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             raise ResetNeeded("no episode has begun: call reset() before step()")
         u = applied_force(actions, self.num_envs, self.task.force_limit)
         over = self._terminated | self._truncated
-        waiting = bool(over.any())
+        waiting = np.count_nonzero(over) > 0
         if waiting:
             held = self._x[:, over]
             u[over] = 0.0
@@ -128,7 +128,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self._terminated, self._truncated = terminated, truncated
         info = self._info(samples, u)
         ended = terminated | truncated
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and ended.any():
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(ended):
             info = self._restart(ended, info)
         return self._observation(), reward, terminated.copy(), truncated.copy(), info
 
@@ -173,6 +173,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         each = [{} for _ in range(self.num_envs)] if not options else self._each(options)
         for i in np.flatnonzero(mask):
             self._params[:, i], self._x[:, i] = self.task.case(self.task.draw(self._generators[i]), each[i])
+        self._told_params = self._params.T.copy()  # never written to again
         self._steps_left[mask] = self.task.steps
         self._terminated[mask] = self._truncated[mask] = False
 
@@ -195,7 +196,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         return {
             "state": self._x.T.copy(),
             "_state": everywhere,
-            "params": self._params.T.copy(),
+            "params": self._told_params,
             "_params": everywhere,
             "force": force,
             "_force": everywhere,

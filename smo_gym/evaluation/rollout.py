@@ -91,10 +91,11 @@ def rollout(
     failed = np.zeros(n, dtype=np.bool_)
     first, agent_state = np.ones(n, dtype=np.bool_), None
     later = ~first
+    failures = 0
     for k in range(1, task.steps + 1):
         action, agent_state = agent.predict(observation, agent_state, first, True)
         first = later
-        if failed.any():
+        if failures:
             action = np.where(failed[:, None], 0.0, action)
         observation, _, terminated, _, info = env.step(action)
         metrics.add(sums, info, observation, failed)
@@ -102,7 +103,8 @@ def rollout(
         trace.record(k, observation, info)
         if k % 100 == 0:
             progress(100)
-        if failed.all():
+        failures = np.count_nonzero(failed)
+        if failures == n:
             break
     progress(task.steps % 100)
     return Rollout(metrics.finish(sums, task.control_period), failed, trace.traces())

@@ -1,0 +1,148 @@
+"""Measure controllers on the article's scenarios and put the numbers beside the published ones.
+
+    python agents/evaluate.py --controller all --scenario all
+
+Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and the resolved settings to --out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import sys
+import time
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+
+import yaml
+from tqdm import tqdm
+
+from smo_gym.evaluation import files, scenario, study, tables
+from smo_gym.evaluation.statistics import results
+from smo_gym.validation import unknown
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+SCENARIOS = ("regulation", "initial-conditions")
+CONTROLLERS = ("lqr", "smc")
+ARMS = {
+    "smo": {"on": ("with",), "off": ("without",), "both": ("without", "with")},
+    "oracle": {"on": ("oracle",), "off": ("oracle",), "both": ("oracle",)},
+}
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add("--controller", type=one_of("controller", (*CONTROLLERS, "all")), default="all", help="lqr, smc or all (default)")
+    add(
+        "--scenario",
+        type=one_of("scenario", (*SCENARIOS, "all")),
+        default="all",
+        help="regulation (Table 4), initial-conditions (Table 5) or all (default)",
+    )
+    add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
+    add(
+        "--uncertainty",
+        type=fraction,
+        nargs="+",
+        metavar="X",
+        help="levels in place of the scenario's: fractions in [0, 1) such as 0.05, or percentages such as 5%%",
+    )
+    add("--runs", type=whole(1), default=10, metavar="N", help="random plants a cell (default 10, as in the article)")
+    add("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
+    add("--observer", type=one_of("observer", ("smo", "oracle", "all")), default="smo", help="smo (default), oracle or all")
+    add("--compensation", type=one_of("compensation", ("on", "off", "both")), default="both", help="on, off or both (default)")
+    add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
+    return parser.parse_args(arguments)
+
+
+def one_of(what: str, known: Sequence[str]) -> object:
+    """An argument type: one of some names, with a suggestion for any other."""
+
+    def parse_name(text: str) -> str:
+        if text not in known:
+            raise argparse.ArgumentTypeError(unknown(what, text, known))
+        return text
+
+    return parse_name
+
+
+def whole(least: int) -> object:
+    """An argument type: a whole number of at least ``least``."""
+
+    def parse_whole(text: str) -> int:
+        if not text.isdecimal() or int(text) < least:
+            raise argparse.ArgumentTypeError(f"{text!r} must be a whole number of at least {least}")
+        return int(text)
+
+    return parse_whole
+
+
+def fraction(text: str) -> float:
+    """An argument type: a fraction in [0, 1), also as a percentage."""
+    try:
+        value = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a fraction in [0, 1) such as 0.05, or a percentage such as 5%")
+    return value
+
+
+def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
+    """The chosen scenarios, with the levels of the command line."""
+    names = SCENARIOS if arguments.scenario == "all" else (arguments.scenario,)
+    paths = [arguments.config] if arguments.config else [CONFIGS / f"{name}.yaml" for name in names]
+    found = [scenario.load(path) for path in paths]
+    if arguments.uncertainty is not None:
+        levels = scenario.Setting[tuple[float, ...]](value=tuple(arguments.uncertainty), source="chosen")
+        found = [one.model_copy(update={"uncertainty": levels}) for one in found]
+    return found
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
+    args = parse(arguments)
+    began = time.perf_counter()
+    try:
+        scenarios = load(args)
+        out = files.prepare(args.out)
+    except ValueError as error:
+        print(f"evaluate.py: error: {error}", file=sys.stderr)
+        return 2
+    controllers = CONTROLLERS if args.controller == "all" else (args.controller,)
+    observers = tuple(ARMS) if args.observer == "all" else (args.observer,)
+    arms = [arm for observer in observers for arm in ARMS[observer][args.compensation]]
+    groups = study.groups(scenarios, controllers, arms, args.runs)
+    try:
+        with tqdm(total=study.simulated_seconds(groups), unit="s", unit_scale=True, desc="simulated", leave=False, disable=None) as bar:
+            outcomes = study.measure(groups, args.seed, bar.update)
+    except KeyboardInterrupt:
+        print("evaluate.py: interrupted, nothing was written", file=sys.stderr)
+        return 130
+    numbers = results(outcomes)
+    print(tables.render(numbers, "simple", rms=False))
+    print(tables.diagnostics(outcomes, "simple"))
+    resolved = {
+        "command": {key: str(value) if isinstance(value, Path) else value for key, value in vars(args).items()},
+        "versions": {"python": platform.python_version()}
+        | {name: metadata.version(name) for name in ("smo_gym", "gymnasium", "numba", "numpy", "scipy")},
+        "scenarios": [one.model_dump(mode="json") for one in scenarios],
+    }
+    notes = tables.diagnostics(outcomes, "github")
+    files.write(out / "results.csv", tables.results_csv(numbers))
+    files.write(out / "runs.csv", tables.runs_csv(outcomes))
+    files.write(out / "tables.md", tables.render(numbers, "github", rms=True) + f"\n## Diagnostics\n\n{notes}\n")
+    files.write(out / "tables.tex", tables.render(numbers, "latex_booktabs", rms=True))
+    files.write(out / "settings.yaml", yaml.safe_dump(resolved, sort_keys=False))
+    runs = sum(group.runs for group in groups)
+    print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,28 @@
+"""Results on disk: noticed early where they cannot go, and never half written."""
+
+import os
+import tempfile
+from pathlib import Path
+
+
+def prepare(folder: Path) -> Path:
+    """Make a folder for results and prove that it can be written to, before any work is done for it.
+
+    Raises:
+        ValueError: it cannot be made or written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ValueError(f"--out {folder}: cannot be written to ({error.strerror})") from None
+    return folder
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file as a whole: whoever looks finds the old one or the new one."""
+    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:
+        file.write(text)
+    os.chmod(file.name, 0o644)
+    os.replace(file.name, path)

@@ -1,0 +1,126 @@
+"""All runs that tables need: paired, in as few batches as there are controllers and environments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from ..plant import CartPendulum
+from ..wrappers import VectorObserverWrapper
+from .rollout import rollout
+from .scenario import ControllerSettings, Scenario
+
+Array = NDArray[np.float64]
+ARMS = ("without", "with", "oracle")
+"""Compensation of the input uncertainty off, on; and the true state in place of an estimate."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """The runs of one controller from one initial state at one level of uncertainty with one observer."""
+
+    scenario: Scenario
+    controller: str
+    uncertainty: float
+    case: str
+    arm: str
+    runs: int
+
+    @property
+    def settings(self) -> ControllerSettings:
+        """Of its controller."""
+        return self.scenario.controllers[self.controller]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What the runs of a group gave: run r of every group has the same draw of the plant."""
+
+    group: Group
+    metrics: dict[str, Array]
+    """Metric name to values (runs,)."""
+    failed: NDArray[np.bool_]
+    """(runs,)."""
+
+
+def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequence[str], runs: int) -> list[Group]:
+    """All groups of some scenarios, with the nominal plant (0 %, one run) beside the scenarios' own levels."""
+    return [
+        Group(scenario, controller, level, case, arm, runs if level > 0.0 else 1)
+        for scenario in scenarios
+        for controller in controllers
+        for level in sorted({0.0, *scenario.uncertainty.value})
+        for case in scenario.initial_states.value
+        for arm in arms
+    ]
+
+
+def deviations(seed: int, runs: int) -> Array:
+    """What multiplies the level of uncertainty in M_c, m and l, U(-1, 1), (runs, 3).
+
+    Run r's draw depends on the seed and r alone, so more runs add to those that were there.
+    """
+    return np.array([np.random.default_rng([seed, run]).uniform(-1.0, 1.0, 3) for run in range(runs)])
+
+
+def measure(
+    wanted: Sequence[Group], seed: int, progress: Callable[[float], object] = lambda seconds: None
+) -> list[Outcome]:
+    """Run all groups.
+
+    Args:
+        wanted: the groups; those that share environment, controller and kind of observer are one batch.
+        seed: of the plants.
+        progress: called with the simulated seconds (over all slots) done since the last call.
+    """
+    batches: dict[Any, list[int]] = {}
+    for index, group in enumerate(wanted):
+        scenario = group.scenario
+        key = (scenario.environment, str(scenario.options), group.settings, group.arm == "oracle")
+        batches.setdefault(key, []).append(index)
+    outcomes: dict[int, Outcome] = {}
+    for indices in batches.values():
+        for index, outcome in zip(indices, _run([wanted[i] for i in indices], seed, progress), strict=True):
+            outcomes[index] = outcome
+    return [outcomes[index] for index in range(len(wanted))]
+
+
+def simulated_seconds(wanted: Iterable[Group]) -> float:
+    """The total that :func:`measure` reports to its ``progress``."""
+    return sum(group.runs * group.scenario.horizon.value for group in wanted)
+
+
+def _run(batch: Sequence[Group], seed: int, progress: Callable[[float], object]) -> list[Outcome]:
+    scenario, settings = batch[0].scenario, batch[0].settings
+    draws = deviations(seed, max(group.runs for group in batch))
+    states, plants, observers = [], [], []
+    for group in batch:
+        observer = settings.observer.build(group.arm == "with")
+        for draw in draws[: group.runs]:
+            states.append(group.scenario.initial_states.value[group.case])
+            plants.append(CartPendulum().perturbed(group.uncertainty * draw).as_array())
+            observers.append(observer)
+    env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
+        scenario.environment, len(states), autoreset_mode=AutoresetMode.DISABLED, **scenario.options
+    )
+    observed = VectorObserverWrapper(env, "oracle" if batch[0].arm == "oracle" else observers)
+    dt = scenario.control_period.value
+    result = rollout(
+        observed,
+        settings.build(dt),
+        options={"state": np.array(states), "params": np.array(plants)},
+        progress=lambda steps: progress(steps * dt * len(states)),
+    )
+    edges = np.cumsum([group.runs for group in batch])[:-1]
+    failed = np.split(result.failed, edges)
+    columns = {name: np.split(values, edges) for name, values in result.metrics.items()}
+    return [
+        Outcome(group, {name: parts[i] for name, parts in columns.items()}, failed[i]) for i, group in enumerate(batch)
+    ]
+

@@ -1,0 +1,193 @@
+"""Results as tables to read (console, Markdown, LaTeX) and as data (CSV)."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, fields
+
+import numpy as np
+from tabulate import tabulate
+
+from ..article import Cell
+from .metrics import NAMES
+from .statistics import Result
+from .study import ARMS, Outcome
+
+_SYMBOL = {"h": "h", "theta": "theta"}
+_REDUCTION = "mse_reduction_percent"
+
+
+def _by_table(results: Iterable[Result]) -> dict[tuple[str, str], list[Result]]:
+    tables: dict[tuple[str, str], list[Result]] = {}
+    for result in results:
+        tables.setdefault((result.cell.table, result.cell.controller), []).append(result)
+    return tables
+
+
+def render(results: Sequence[Result], form: str, *, rms: bool) -> str:
+    """Every table beside the published one, with its verdict.
+
+    Args:
+        results: of :func:`smo_gym.evaluation.statistics.results`.
+        form: a format of tabulate: "simple" for a console, "github" for Markdown, "latex_booktabs".
+        rms: whether to show the RMS rows, which are the roots of the MSE rows, too.
+    """
+    parts = []
+    for (table, controller), rows in _by_table(results).items():
+        parts.append(_heading(f"Table {table}, {controller.upper()}", form))
+        shown = [row for row in rows if row.cell.metric == "mse" or (rms and row.cell.metric == "rms")]
+        header = ("", "state", "compensation", "published", "measured", "95 % interval", "median", "ratio", "failed")
+        parts.append(_table(form, header, [_cell_row(row) for row in shown]))
+        reductions = [row for row in rows if row.cell.metric == _REDUCTION]
+        if reductions:
+            header = ("", "state", "published %", "measured %", "95 % interval", "median")
+            parts.append(_heading("Reduction of the MSE by the compensation", form, level=3))
+            parts.append(_table(form, header, [_reduction_row(row) for row in reductions]))
+        parts.append(verdict(rows))
+    return "\n\n".join(parts) + "\n"
+
+
+def verdict(rows: Sequence[Result]) -> str:
+    """One sentence on how one controller's table compares with the published one."""
+    cells = [row for row in rows if row.cell.metric == "mse" and math.isfinite(row.deviation) and not _is_average(row.cell)]
+    runs = sum(row.runs for row in rows if row.cell.metric == "mse" and row.cell.state == "h" and not _is_average(row.cell))
+    failures = sum(
+        row.failures for row in rows if row.cell.metric == "mse" and row.cell.state == "h" and not _is_average(row.cell)
+    )
+    failed = f"{failures} of {runs} runs failed."
+    if not cells:
+        return f"No published cell to compare with. {failed}"
+    deviations = np.array([row.deviation for row in cells])
+    ratios = np.exp(deviations)
+    averages = [row for row in rows if row.cell.metric == "mse" and math.isfinite(row.deviation) and _is_average(row.cell)]
+    return (
+        f"{len(cells)} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(deviations**2)):.1f} %, "
+        f"{np.sum(np.abs(ratios - 1.0) <= 0.1)} within 10 %, furthest off {100 * (ratios[np.argmax(np.abs(deviations))] - 1):+.1f} %; "
+        f"averages off {', '.join(f'{100 * (math.exp(row.deviation) - 1):+.1f} %' for row in averages)}. {failed}"
+    )
+
+
+def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
+    """What else the runs showed, a mean over each controller's runs that did not fail."""
+    header = ("table", "controller", "arm", *_DIAGNOSTICS.values())
+    rows = []
+    keys = dict.fromkeys((o.group.scenario.table, o.group.controller) for o in outcomes)
+    for table, controller in keys:
+        for arm in ARMS:
+            chosen = [
+                o
+                for o in outcomes
+                if (o.group.scenario.table, o.group.controller, o.group.arm) == (table, controller, arm)
+                and o.group.uncertainty > 0.0
+            ]
+            if chosen:
+                means = [np.mean(np.concatenate([o.metrics[name][~o.failed] for o in chosen])) for name in _DIAGNOSTICS]
+                rows.append((table, controller.upper(), arm, *(f"{mean:.3g}" for mean in means)))
+    return _table(form, header, rows)
+
+
+_DIAGNOSTICS = {
+    "estimation_rms_h": "est. h, m",
+    "estimation_rms_theta": "est. theta, rad",
+    "estimation_rms_h_dot": "est. h', m/s",
+    "estimation_rms_theta_dot": "est. theta', rad/s",
+    "effort": "effort, N^2 s",
+    "total_variation": "variation, N",
+    "peak_h": "peak h, m",
+    "peak_theta": "peak theta, rad",
+    "peak_force": "peak F, N",
+}
+
+
+def results_csv(results: Sequence[Result]) -> str:
+    """One line a result: the columns of the published data, then published, measured, ci_low, ci_high, runs, failures, median."""
+    numbers = ("published", "measured", "ci_low", "ci_high", "runs", "failures", "median")
+    header = [*(field.name for field in fields(Cell)), *numbers]
+    return _csv(header, ([*asdict(r.cell).values(), *(_exact(getattr(r, name)) for name in numbers)] for r in results))
+
+
+def runs_csv(outcomes: Sequence[Outcome]) -> str:
+    """One line a run, with every metric."""
+    header = ["table", "controller", "uncertainty", "case", "arm", "run", "failed", *NAMES]
+
+    def lines() -> Iterable[list[object]]:
+        for outcome in outcomes:
+            group = outcome.group
+            place = [group.scenario.table, group.controller, group.uncertainty, group.case, group.arm]
+            for run, failed in enumerate(outcome.failed):
+                yield [*place, run, int(failed), *(_exact(outcome.metrics[name][run]) for name in NAMES)]
+
+    return _csv(header, lines())
+
+
+def _csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(lines)
+    return file.getvalue()
+
+
+def _exact(value: float) -> object:
+    """The shortest text that reads back as the same number; empty for none."""
+    if isinstance(value, int):
+        return value
+    return repr(float(value)) if math.isfinite(value) else ""
+
+
+def _is_average(cell: Cell) -> bool:
+    return "average" in (cell.uncertainty_percent, cell.case)
+
+
+def _label(cell: Cell) -> str:
+    if _is_average(cell):
+        return "average"
+    parts = [f"case {cell.case}"] * bool(cell.case) + [f"{cell.uncertainty_percent} %"] * bool(cell.uncertainty_percent)
+    return ", ".join(parts)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else ""
+
+
+def _cell_row(row: Result) -> tuple[str, ...]:
+    ratio = math.exp(row.deviation)
+    state = row.cell.state if row.cell.metric == "mse" else f"{row.cell.metric.upper()} {row.cell.state}"
+    return (
+        _label(row.cell),
+        state,
+        row.cell.compensation,
+        _number(row.published),
+        _number(row.measured),
+        _span(row, _number),
+        _number(row.median),
+        f"{ratio:.3f}" if math.isfinite(ratio) else "",
+        f"{row.failures} of {row.runs}" if row.failures else "0",
+    )
+
+
+def _reduction_row(row: Result) -> tuple[str, ...]:
+    def percent(value: float) -> str:
+        return f"{value:.1f}" if math.isfinite(value) else ""
+
+    numbers = (percent(row.published), percent(row.measured), _span(row, percent), percent(row.median))
+    return (_label(row.cell), row.cell.state, *numbers)
+
+
+def _span(row: Result, text: Callable[[float], str]) -> str:
+    return f"[{text(row.ci_low)}, {text(row.ci_high)}]" if math.isfinite(row.ci_low) else ""
+
+
+def _heading(text: str, form: str, level: int = 2) -> str:
+    if form == "github":
+        return f"{'#' * level} {text}"
+    if form.startswith("latex"):
+        return f"\\{'sub' * (level - 2)}section*{{{text}}}"
+    return text if level > 2 else f"{text}\n{'=' * len(text)}"
+
+
+def _table(form: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return tabulate(rows, header, tablefmt=form, disable_numparse=True, colalign=["left"] * 2 + ["right"] * (len(header) - 2))
