@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
-from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
+from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv, VectorWrapper
 from numpy.typing import NDArray
 
 from .envs.task import Task
@@ -43,7 +43,11 @@ def make_observer(observer: str | Observer, compensation: bool, settings: dict[s
 
 
 def _task(env: Any) -> Task:
-    task = getattr(env.unwrapped, "task", None)
+    base = env.unwrapped
+    try:  # a batch of scalar environments has one task each, all alike
+        task = base.get_attr("task")[0] if isinstance(base, (SyncVectorEnv, AsyncVectorEnv)) else base.task
+    except AttributeError:
+        task = None
     if not isinstance(task, Task):
         raise TypeError(f"{env} is no smo_gym environment: an observer needs its sampling period and its samples")
     return task
@@ -179,7 +183,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         return self._observation(y), reward, terminated, truncated, info
 
     def _observation(self, y: Array) -> Array:
-        self._y = np.ascontiguousarray(y.T)
+        self._y = y.T.copy()
         observation = np.empty((len(y), 6))
         observation[:, :2] = y
         observation[:, 2:] = self._estimator.xhat.T

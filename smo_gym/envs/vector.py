@@ -125,19 +125,19 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
                 terminated[over] = truncated[over] = False
                 self._start(over, {})
             samples[:, :, over] = self._x[:2, over]
-        self._terminated, self._truncated = terminated, truncated
+        self._terminated, self._truncated = terminated.copy(), truncated.copy()
         info = self._info(samples, u)
         ended = terminated | truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(ended):
             info = self._restart(ended, info)
-        return self._observation(), reward, terminated.copy(), truncated.copy(), info
+        return self._observation(), reward, terminated, truncated, info
 
     def _restart(self, ended: Flags, final: dict[str, Any]) -> dict[str, Any]:
         """Start ended slots in the step that ended them (SAME_STEP): the last they gave goes to ``final_*``."""
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
             final_obs[i] = self._x[:2, i].copy()
-        final_info = {key: ended.copy() if key.startswith("_") else value for key, value in final.items()}
+        final_info = {key: _only(value, ended) for key, value in final.items()}
         self._start(ended, {})
         samples, force = final["samples"].copy(), final["force"].copy()
         samples[ended] = self._x[:2, ended].T[:, None]
@@ -189,7 +189,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         return np.repeat(self._x[None, :2], self._stepper.substeps, axis=0)
 
     def _observation(self) -> Array:
-        return np.ascontiguousarray(self._x[:2].T)
+        return self._x[:2].T.copy()
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
         everywhere = self._everywhere
@@ -203,6 +203,13 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             "samples": samples.transpose(2, 0, 1),
             "_samples": everywhere,
         }
+
+
+def _only(values: Array, slots: Flags) -> Array:
+    """The values of some slots, zero (False) elsewhere, as Gymnasium's own vector environments give them."""
+    some = np.zeros_like(values)
+    some[slots] = values[slots]
+    return some
 
 
 class UprightVectorEnv(PendulumVectorEnv):

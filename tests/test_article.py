@@ -1,0 +1,49 @@
+"""The published data and the printed constants."""
+
+import numpy as np
+
+from smo_gym import CartPendulum, article
+
+
+def cells(**where):
+    return {
+        cell: value
+        for cell, value in article.published().items()
+        if all(getattr(cell, name) == wanted for name, wanted in where.items())
+    }
+
+
+def test_all_printed_cells_are_there():
+    assert len(article.published()) == 176
+    assert len(cells(metric="mse")) == 104
+    assert len(cells(table="5")) == 32
+
+
+def test_every_printed_rms_is_the_root_of_its_mse():
+    from dataclasses import replace
+
+    for cell, rms in cells(metric="rms").items():
+        mse = article.published()[replace(cell, metric="mse")]
+        assert abs(rms - np.sqrt(mse)) < 1e-4
+
+
+def test_averages_and_reductions_of_table_4_follow_from_its_cells():
+    printed = {"lqr": ((0.121, 0.044882, 62.91), (0.04563, 0.031057, 31.94)), "smc": ((0.166883, 0.091493, 45.18), (0.018158, 0.012045, 33.67))}
+    for controller, states in printed.items():
+        for state, (without, with_, reduction) in zip(("h", "theta"), states, strict=True):
+            mean = {
+                arm: np.mean(list(cells(table="4", controller=controller, metric="mse", state=state, compensation=arm).values()))
+                for arm in ("without", "with")
+            }
+            assert abs(mean["without"] - without) < 6e-5
+            assert abs(mean["with"] - with_) < 6e-6
+            assert abs(100 * (1 - mean["with"] / mean["without"]) - reduction) < 0.02
+
+
+def test_table_2_is_the_default_plant():
+    assert CartPendulum().as_dict() == {"cart_mass": 3.5, "bob_mass": 0.32, "rod_length": 0.44, "gravity": -9.8}
+
+
+def test_the_levels_are_those_of_the_data():
+    assert {int(cell.uncertainty_percent) for cell in cells(table="4")} == set(article.UNCERTAINTIES_PERCENT)
+    assert {cell.case for cell in cells(table="5")} == set(article.INITIAL_STATES)

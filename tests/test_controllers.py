@@ -1,0 +1,112 @@
+"""LQR against python-control, SMC against its equations, and Stable-Baselines3's way to call both."""
+
+import math
+
+import control
+import gymnasium
+import numpy as np
+import pytest
+
+from smo_gym import LQR, CartPendulum, ObserverWrapper, SlidingModeController
+
+Q, R = [52.33, 57.61, 61.30, 0.39], 1.0
+
+
+@pytest.mark.parametrize("model", [CartPendulum(), CartPendulum(gravity=9.8)])
+@pytest.mark.parametrize("theta", [0.0, math.pi])
+def test_lqr_gain_is_that_of_python_control(model, theta):
+    expected, *_ = control.lqr(*model.linearise(theta), np.diag(Q), np.array([[R]]))
+    np.testing.assert_allclose(LQR.design(Q, R, model, theta).K, expected, rtol=1e-8)
+
+
+def test_lqr_takes_full_weights():
+    full = np.diag(Q) + 0.1
+    expected, *_ = control.lqr(*CartPendulum().linearise(), full, np.array([[2.0]]))
+    np.testing.assert_allclose(LQR.design(full, 2.0).K, expected, rtol=1e-8)
+
+
+def test_lqr_is_minus_gain_times_estimate():
+    K = np.array([1.0, -2.0, 3.0, -4.0])
+    observation = np.random.default_rng(0).normal(size=(5, 6))
+    action, state = LQR(K).predict(observation)
+    np.testing.assert_allclose(action, -observation[:, 2:] @ K[:, None])
+    assert state is None
+    one, _ = LQR(K).predict(observation[2])
+    assert one.shape == (1,)
+    assert one[0] == action[2, 0]
+
+
+def test_lqr_may_have_a_gain_a_slot():
+    K = np.random.default_rng(0).normal(size=(5, 4))
+    observation = np.random.default_rng(1).normal(size=(5, 6))
+    expected = -(observation[:, 2:] * K).sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(LQR(K).predict(observation)[0], expected)
+
+
+def smc_by_hand(estimates, k, dt, slope, Z0=26.0, lam=30.0, epsilon=0.1460):
+    """Equations (49)-(50) in plain Python."""
+    integral, forces = 0.0, []
+    for h, theta, v, omega in estimates:
+        s = 0.5 * (k[0] * h + k[2] * v) ** 2 + 0.5 * (k[1] * theta + k[3] * omega) ** 2
+        switch = math.sin(math.pi / epsilon * (s + lam * integral))
+        forces.append(Z0 * math.tanh(slope * switch))
+        integral += dt * math.tanh(s)
+    return forces
+
+
+def test_smc_is_its_equations():
+    k, dt, slope = (0.6, 1.5, 1.6, 0.4), 0.001, 3.0
+    estimates = np.random.default_rng(0).normal(size=(50, 4))
+    law, state, forces = SlidingModeController(k, dt, slope), None, []
+    for estimate in estimates:
+        action, state = law.predict(np.concatenate([[9.0, 9.0], estimate]), state)
+        forces.append(action[0])
+    np.testing.assert_allclose(forces, smc_by_hand(estimates, k, dt, slope), rtol=1e-10)
+
+
+def test_smc_restarts_its_integral_slot_by_slot():
+    law = SlidingModeController((0.6, 1.5, 1.6, 0.4), 0.001, 3.0)
+    observation = np.ones((3, 6))
+    _, state = law.predict(observation)
+    before = state[0].copy()
+    _, after = law.predict(observation, state, episode_start=np.array([False, True, False]))
+    assert (state[0] == before).all()  # the state that was handed in is left alone
+    assert after[0][1] == before[0]
+    assert after[0][0] == after[0][2] == pytest.approx(2 * before[0])
+
+
+def test_smc_with_exact_sgn_has_full_amplitude():
+    law = SlidingModeController((0.6, 1.5, 1.6, 0.4), 0.001, math.inf)
+    action, _ = law.predict(np.random.default_rng(0).normal(size=(20, 6)))
+    assert set(np.abs(action[:, 0])) == {26.0}
+
+
+@pytest.mark.parametrize("law", [LQR([7.2, -4.1, 11.1, -1.0]), SlidingModeController((0.6, 1.5, 1.6, 0.4), 0.02, 60.0)])
+def test_stable_baselines3_evaluates_a_law(law):
+    evaluate_policy = pytest.importorskip("stable_baselines3.common.evaluation").evaluate_policy
+    from stable_baselines3.common.monitor import Monitor
+
+    env = Monitor(ObserverWrapper(gymnasium.make("SMOPendulum-v0", horizon=1.0)))
+    rewards, lengths = evaluate_policy(law, env, n_eval_episodes=3, return_episode_rewards=True)
+    assert lengths == [50, 50, 50]
+    assert np.isfinite(rewards).all()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: LQR([1.0, 2.0]), r"K=.* must be finite and of shape \(4,\) or \(n, 4\)"),
+        (lambda: LQR([1.0, 2.0, np.nan, 0.0]), "K=.* must be finite"),
+        (lambda: LQR.design([1, 1, 1, -1], 1.0), "Q=.* must be symmetric positive semidefinite"),
+        (lambda: LQR.design(np.triu(np.ones((4, 4))), 1.0), "(?s)Q=.* must be symmetric positive semidefinite"),
+        (lambda: LQR.design(Q, 0.0), r"R=0\.0 must be a finite number greater than 0"),
+        (lambda: SlidingModeController((1, 1, 1, 0), 0.001, 1.0), "k=.* must be positive"),
+        (lambda: SlidingModeController((1, 1, 1), 0.001, 1.0), r"k has shape \(3,\)"),
+        (lambda: SlidingModeController((1, 1, 1, 1), 0.0, 1.0), "dt=0.0 must be a finite number greater than 0"),
+        (lambda: SlidingModeController((1, 1, 1, 1), 0.001, -1.0), "slope=-1.0 must be a finite number greater than 0"),
+        (lambda: LQR([1, 1, 1, 1]).predict(np.zeros((3, 2))), "wrap the environment in smo_gym.ObserverWrapper"),
+    ],
+)
+def test_bad_settings_are_named(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
