@@ -1,0 +1,181 @@
+"""The command line, as a user calls it."""
+
+import csv
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parent.parent
+EVALUATE = ROOT / "agents" / "evaluate.py"
+
+
+def evaluate(*arguments, cwd=None, check=True):
+    command = [sys.executable, str(EVALUATE), *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, check=check, capture_output=True, text=True)
+
+
+def read(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def published_cells(rows, controller, table):
+    return [
+        row
+        for row in rows
+        if row["metric"] == "mse"
+        and row["published"]
+        and "average" not in (row["case"], row["uncertainty_percent"])
+        and (row["controller"], row["table"]) == (controller, table)
+    ]
+
+
+@pytest.fixture(scope="module")
+def both_tables(tmp_path_factory):
+    """Tables 4 and 5 for both controllers with the default 10 runs."""
+    out = tmp_path_factory.mktemp("both")
+    done = evaluate("--controller", "all", "--scenario", "all", "--out", out)
+    return done.stdout, read(out / "results.csv"), out
+
+
+def test_all_published_cells_are_measured(both_tables):
+    text, rows, _ = both_tables
+    for controller in ("lqr", "smc"):
+        assert len(published_cells(rows, controller, "4")) == 24
+        assert len(published_cells(rows, controller, "5")) == 16
+        for table in ("4", "5"):
+            assert f"Table {table}, {controller.upper()}" in text
+    assert all(row["measured"] for row in rows)
+    assert {row["uncertainty_percent"] for row in rows if row["table"] == "4"} == {*"0 5 7 10 15 18 20".split(), "average"}
+
+
+def test_columns_begin_with_those_of_the_published_data(both_tables):
+    _, rows, _ = both_tables
+    published = read(ROOT / "smo_gym" / "article" / "published.csv")
+    keys = [*published[0]][:-1]
+    assert [*rows[0]][: len(keys)] == keys
+    assert [*rows[0]][len(keys) :] == ["published", "measured", "ci_low", "ci_high", "runs", "failures", "median"]
+    ours = {tuple(row[key] for key in keys): row["published"] for row in rows}
+    for row in published:
+        if row["table"] in "45":
+            assert float(ours[tuple(row[key] for key in keys)]) == float(row["value"])
+
+
+def test_lqr_cells_of_table_5_are_within_ten_percent(both_tables):
+    _, rows, _ = both_tables
+    ratios = [float(row["measured"]) / float(row["published"]) for row in published_cells(rows, "lqr", "5")]
+    assert len(ratios) == 16
+    assert all(abs(ratio - 1) < 0.1 for ratio in ratios)
+
+
+def test_everything_that_was_promised_is_written(both_tables):
+    _, rows, out = both_tables
+    assert {path.name for path in out.iterdir()} == {"results.csv", "runs.csv", "tables.md", "tables.tex", "settings.yaml"}
+    assert "| average" in (out / "tables.md").read_text()
+    assert r"\toprule" in (out / "tables.tex").read_text()
+    settings = yaml.safe_load((out / "settings.yaml").read_text())
+    assert settings["command"]["runs"] == 10
+    assert settings["scenarios"][1]["controllers"]["smc"]["Z0"] == {"value": 26.0, "source": "printed", "note": "Table 6"}
+    runs = read(out / "runs.csv")
+    assert len(runs) == 2 * 2 * (6 * 10 + 1 + 4 * (10 + 1))
+    assert not any(int(run["failed"]) for run in runs)
+
+
+def test_one_seed_gives_one_result(tmp_path):
+    arguments = ("--controller", "smc", "--scenario", "initial-conditions", "--runs", "2", "--seed", "5")
+    for name in ("a", "b"):
+        evaluate(*arguments, "--out", tmp_path / name)
+    assert (tmp_path / "a" / "results.csv").read_bytes() == (tmp_path / "b" / "results.csv").read_bytes()
+    evaluate(*arguments[:-1], "6", "--out", tmp_path / "b")
+    assert (tmp_path / "a" / "results.csv").read_bytes() != (tmp_path / "b" / "results.csv").read_bytes()
+
+
+def small_scenario(tmp_path, **changes):
+    text = (ROOT / "configs" / "initial-conditions.yaml").read_text()
+    data = yaml.safe_load(text) | {"extends": str(ROOT / "configs" / "article.yaml")} | changes
+    path = tmp_path / "own.yaml"
+    path.write_text(yaml.safe_dump(data))
+    return path
+
+
+def test_options_choose_arms_levels_and_files(tmp_path):
+    config = small_scenario(tmp_path, horizon={"value": 0.5, "source": "chosen"})
+    options = ("--uncertainty", "20%", "0.1", "--runs", "3", "--controller", "lqr")
+    done = evaluate("--config", config, *options, "--observer", "oracle", "--out", tmp_path / "new" / "deep")
+    rows = read(tmp_path / "new" / "deep" / "results.csv")
+    assert {row["compensation"] for row in rows} == {"oracle"}
+    assert {row["uncertainty_percent"] for row in rows if row["case"] == "1"} == {"0", "10", "20"}
+    assert "No published cell to compare with" in done.stdout
+    evaluate("--config", config, *options, "--compensation", "on", "--observer", "all", "--out", tmp_path / "b")
+    assert {row["compensation"] for row in read(tmp_path / "b" / "results.csv")} == {"oracle", "with"}
+
+
+def test_failed_runs_are_shown(tmp_path):
+    config = small_scenario(
+        tmp_path, horizon={"value": 3.0, "source": "chosen"}, track_limit={"value": 0.9, "source": "chosen"}
+    )
+    done = evaluate("--config", config, "--runs", "3", "--controller", "lqr", "--out", tmp_path / "out")
+    rows = read(tmp_path / "out" / "results.csv")
+    case_1 = [row for row in rows if row["case"] == "1" and row["metric"] == "mse"]
+    case_2 = [row for row in rows if row["case"] == "2" and row["metric"] == "mse"]
+    assert all(row["failures"] == row["runs"] and row["measured"] == "" for row in case_1)
+    assert all(row["failures"] == "0" and row["measured"] for row in case_2)
+    assert "3 of 3" in done.stdout
+    assert "44 of 88 runs failed" in done.stdout or "runs failed" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--controller", "lqg"], "unknown controller 'lqg': did you mean 'lqr'?"),
+        (["--scenario", "regulaton"], "unknown scenario 'regulaton': did you mean 'regulation'?"),
+        (["--observer", "oracel"], "did you mean 'oracle'?"),
+        (["--runs", "0"], "'0' must be a whole number of at least 1"),
+        (["--uncertainty", "1"], "'1' must be a fraction in [0, 1) such as 0.05, or a percentage such as 5%"),
+        (["--uncertainty", "5"], "or a percentage such as 5%"),
+        (["--config", "none.yaml"], "none.yaml: cannot be read"),
+        (["--run", "3"], "unrecognized arguments: --run"),
+    ],
+)
+def test_bad_arguments_are_named_before_any_work(tmp_path, arguments, message):
+    done = evaluate(*arguments, "--out", tmp_path / "out", cwd=tmp_path, check=False)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_config_typo_is_named(tmp_path):
+    path = small_scenario(tmp_path, horizn={"value": 1.0, "source": "chosen"})
+    done = evaluate("--config", path, check=False, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "did you mean 'horizon'?" in done.stderr
+
+
+def test_an_unwritable_folder_is_noticed_before_the_work(tmp_path):
+    (tmp_path / "file").write_text("")
+    done = evaluate("--out", tmp_path / "file" / "out", "--runs", "100000", check=False)
+    assert done.returncode == 2
+    assert "cannot be written to" in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs a signal")
+def test_an_interruption_is_said_and_leaves_old_results(tmp_path):
+    import signal
+    import time
+
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "results.csv").write_text("old")
+    command = [sys.executable, str(EVALUATE), "--runs", "2000", "--out", str(out)]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    time.sleep(4.0)
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted, nothing was written" in stderr
+    assert (out / "results.csv").read_text() == "old"
