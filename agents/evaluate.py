@@ -11,7 +11,7 @@ import argparse
 import platform
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import metadata
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from smo_gym.validation import unknown
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions")
 CONTROLLERS = ("lqr", "smc")
-ARMS = {
+ARMS: dict[str, dict[str, tuple[str, ...]]] = {
     "smo": {"on": ("with",), "off": ("without",), "both": ("without", "with")},
     "oracle": {"on": ("oracle",), "off": ("oracle",), "both": ("oracle",)},
 }
@@ -37,7 +37,12 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
     )
     add = parser.add_argument
-    add("--controller", type=one_of("controller", (*CONTROLLERS, "all")), default="all", help="lqr, smc or all (default)")
+    add(
+        "--controller",
+        type=one_of("controller", (*CONTROLLERS, "all")),
+        default="all",
+        help="lqr, smc or all (default)",
+    )
     add(
         "--scenario",
         type=one_of("scenario", (*SCENARIOS, "all")),
@@ -54,13 +59,23 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     add("--runs", type=whole(1), default=10, metavar="N", help="random plants a cell (default 10, as in the article)")
     add("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
-    add("--observer", type=one_of("observer", ("smo", "oracle", "all")), default="smo", help="smo (default), oracle or all")
-    add("--compensation", type=one_of("compensation", ("on", "off", "both")), default="both", help="on, off or both (default)")
+    add(
+        "--observer",
+        type=one_of("observer", ("smo", "oracle", "all")),
+        default="smo",
+        help="smo (default), oracle or all",
+    )
+    add(
+        "--compensation",
+        type=one_of("compensation", ("on", "off", "both")),
+        default="both",
+        help="on, off or both (default)",
+    )
     add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
     return parser.parse_args(arguments)
 
 
-def one_of(what: str, known: Sequence[str]) -> object:
+def one_of(what: str, known: Sequence[str]) -> Callable[[str], str]:
     """An argument type: one of some names, with a suggestion for any other."""
 
     def parse_name(text: str) -> str:
@@ -71,7 +86,7 @@ def one_of(what: str, known: Sequence[str]) -> object:
     return parse_name
 
 
-def whole(least: int) -> object:
+def whole(least: int) -> Callable[[str], int]:
     """An argument type: a whole number of at least ``least``."""
 
     def parse_whole(text: str) -> int:
@@ -89,7 +104,9 @@ def fraction(text: str) -> float:
     except ValueError:
         value = -1.0
     if not 0.0 <= value < 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a fraction in [0, 1) such as 0.05, or a percentage such as 5%")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} must be a fraction in [0, 1) such as 0.05, or a percentage such as 5%"
+        )
     return value
 
 
@@ -119,7 +136,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arms = [arm for observer in observers for arm in ARMS[observer][args.compensation]]
     groups = study.groups(scenarios, controllers, arms, args.runs)
     try:
-        with tqdm(total=study.simulated_seconds(groups), unit="s", unit_scale=True, desc="simulated", leave=False, disable=None) as bar:
+        with tqdm(
+            total=study.simulated_seconds(groups),
+            unit="s",
+            unit_scale=True,
+            desc="simulated",
+            leave=False,
+            disable=None,
+        ) as bar:
             outcomes = study.measure(groups, args.seed, bar.update)
     except KeyboardInterrupt:
         print("evaluate.py: interrupted, nothing was written", file=sys.stderr)

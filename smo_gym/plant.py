@@ -26,8 +26,8 @@ class CartPendulum:
     """Parameters of the cart pendulum, by default the article's Table 2.
 
     The state is x = [h, theta, h', theta'] in m, rad, m/s, rad/s and the input u = F in N. theta is measured from the
-    upward vertical for ``gravity > 0``. The article prints g = -9.8 m/s^2 (Table 2), which turns the picture over: theta = 0 is
-    then the *hanging*, stable equilibrium.
+    upward vertical for ``gravity > 0``. The article prints g = -9.8 m/s^2 (Table 2), which turns the picture over:
+    theta = 0 is then the *hanging*, stable equilibrium.
 
     Args:
         cart_mass: M_c in kg.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any, cast
 
 import gymnasium
@@ -18,7 +19,7 @@ from .observers.protocol import Estimator
 from .validation import choice, unknown
 
 Array = NDArray[np.float64]
-# An unlimited force bounds nothing; the step is then checked for the largest the article's runs reach (notes of README).
+# A force without limit bounds nothing: the step is then checked for the largest that the article's runs reach.
 _USUAL_FORCE = 30.0
 
 
@@ -33,7 +34,7 @@ def make_observer(observer: str | Observer, compensation: bool, settings: dict[s
             raise ValueError(f"{sorted(settings)} are settings of a named observer; {observer!r} has its own")
         return observer
     cls = OBSERVERS[choice("observer", observer, OBSERVERS)]
-    known = set(cls.__dataclass_fields__)
+    known = {field.name for field in fields(cls)}
     for name in settings:
         if name not in known:
             raise ValueError(unknown(f"setting of the observer {observer!r}", name, known))
@@ -54,11 +55,10 @@ def _task(env: Any) -> Task:
 
 
 def _bound(task: Task) -> float:
-    assert task.force_limit is not None
     return task.force_limit if np.isfinite(task.force_limit) else _USUAL_FORCE
 
 
-def _space(inner: spaces.Space[Any]) -> spaces.Box:
+def _space(inner: spaces.Space[Any]) -> spaces.Space[Array]:
     assert isinstance(inner, spaces.Box)
     return spaces.Box(-np.inf, np.inf, (inner.shape[0] + 4,), np.float64)
 
@@ -84,7 +84,11 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
     """
 
     def __init__(
-        self, env: gymnasium.Env[Array, Array], observer: str | Observer = "smo", compensation: bool = True, **settings: Any
+        self,
+        env: gymnasium.Env[Array, Array],
+        observer: str | Observer = "smo",
+        compensation: bool = True,
+        **settings: Any,
     ) -> None:
         RecordConstructorArgs.__init__(self, observer=observer, compensation=compensation, **settings)
         gymnasium.Wrapper.__init__(self, env)
@@ -161,7 +165,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Run a control period and bring the estimates to its end."""
         y, reward, terminated, truncated, info = self.env.step(actions)
-        ended = terminated | truncated
+        ended = np.logical_or(terminated, truncated)
         same_step = self._mode is AutoresetMode.SAME_STEP
         restarted = ended if same_step else self._over
         any_restarted = np.count_nonzero(restarted) > 0

@@ -28,11 +28,16 @@ def test_every_printed_rms_is_the_root_of_its_mse():
 
 
 def test_averages_and_reductions_of_table_4_follow_from_its_cells():
-    printed = {"lqr": ((0.121, 0.044882, 62.91), (0.04563, 0.031057, 31.94)), "smc": ((0.166883, 0.091493, 45.18), (0.018158, 0.012045, 33.67))}
+    printed = {
+        "lqr": ((0.121, 0.044882, 62.91), (0.04563, 0.031057, 31.94)),
+        "smc": ((0.166883, 0.091493, 45.18), (0.018158, 0.012045, 33.67)),
+    }
     for controller, states in printed.items():
         for state, (without, with_, reduction) in zip(("h", "theta"), states, strict=True):
             mean = {
-                arm: np.mean(list(cells(table="4", controller=controller, metric="mse", state=state, compensation=arm).values()))
+                arm: np.mean(
+                    list(cells(table="4", controller=controller, metric="mse", state=state, compensation=arm).values())
+                )
                 for arm in ("without", "with")
             }
             assert abs(mean["without"] - without) < 6e-5

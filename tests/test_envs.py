@@ -225,7 +225,7 @@ def test_disabled_autoreset_holds_an_ended_slot_until_it_is_reset(make_vec):
     _, reward, terminated, _, info = env.step(np.ones((3, 1)))
     assert terminated.tolist() == [False, True, False]
     held = info["state"][1]
-    _, reward, terminated, truncated, info = env.step(np.ones((3, 1)))
+    _, reward, terminated, _truncated, info = env.step(np.ones((3, 1)))
     assert terminated.tolist() == [False, True, False]
     assert (info["state"][1] == held).all()
     assert reward[1] == info["force"][1] == 0.0
@@ -275,7 +275,9 @@ def test_one_seed_gives_one_result_whatever_the_number_of_slots(make_vec):
 
 
 def test_wrapped_spec_survives_json():
-    spec = ObserverWrapper(gymnasium.make("SMOPendulum-v0", uncertainty=0.2), "smo", compensation=False, gains="smc").spec
+    spec = ObserverWrapper(
+        gymnasium.make("SMOPendulum-v0", uncertainty=0.2), "smo", compensation=False, gains="smc"
+    ).spec
     env = gymnasium.make(EnvSpec.from_json(spec.to_json()))
     assert json.loads(spec.to_json())["kwargs"] == {"uncertainty": 0.2}
     assert env.get_wrapper_attr("observer").compensation is False
@@ -286,7 +288,10 @@ def test_wrapped_spec_survives_json():
     ("options", "message"),
     [
         ({"control_perod": 0.1}, r"unknown environment option 'control_perod': did you mean 'control_period'\?"),
-        ({"control_period": 0.0015}, r"control_period=0\.0015 must be a whole multiple of the integration step dt=0\.001"),
+        (
+            {"control_period": 0.0015},
+            r"control_period=0\.0015 must be a whole multiple of the integration step dt=0\.001",
+        ),
         ({"dt": 0.0}, "dt=0.0 must be a finite number greater than 0"),
         ({"horizon": 0.0}, "horizon=0.0 must be a finite number greater than 0"),
         ({"horizon": 0.03}, "horizon=0.03 must be a whole multiple of control_period"),

@@ -50,7 +50,10 @@ def test_all_published_cells_are_measured(both_tables):
         for table in ("4", "5"):
             assert f"Table {table}, {controller.upper()}" in text
     assert all(row["measured"] for row in rows)
-    assert {row["uncertainty_percent"] for row in rows if row["table"] == "4"} == {*"0 5 7 10 15 18 20".split(), "average"}
+    assert {row["uncertainty_percent"] for row in rows if row["table"] == "4"} == {
+        *["0", "5", "7", "10", "15", "18", "20"],
+        "average",
+    }
 
 
 def test_columns_begin_with_those_of_the_published_data(both_tables):
@@ -73,13 +76,23 @@ def test_lqr_cells_of_table_5_are_within_ten_percent(both_tables):
 
 
 def test_everything_that_was_promised_is_written(both_tables):
-    _, rows, out = both_tables
-    assert {path.name for path in out.iterdir()} == {"results.csv", "runs.csv", "tables.md", "tables.tex", "settings.yaml"}
+    _, _rows, out = both_tables
+    assert {path.name for path in out.iterdir()} == {
+        "results.csv",
+        "runs.csv",
+        "tables.md",
+        "tables.tex",
+        "settings.yaml",
+    }
     assert "| average" in (out / "tables.md").read_text()
     assert r"\toprule" in (out / "tables.tex").read_text()
     settings = yaml.safe_load((out / "settings.yaml").read_text())
     assert settings["command"]["runs"] == 10
-    assert settings["scenarios"][1]["controllers"]["smc"]["Z0"] == {"value": 26.0, "source": "printed", "note": "Table 6"}
+    assert settings["scenarios"][1]["controllers"]["smc"]["Z0"] == {
+        "value": 26.0,
+        "source": "printed",
+        "note": "Table 6",
+    }
     runs = read(out / "runs.csv")
     assert len(runs) == 2 * 2 * (6 * 10 + 1 + 4 * (10 + 1))
     assert not any(int(run["failed"]) for run in runs)

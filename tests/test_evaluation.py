@@ -97,7 +97,7 @@ def test_without_an_observer_there_is_no_estimation_error(closed_loop):
 
 def test_runs_do_not_depend_on_the_batch(closed_loop):
     small, large = (closed_loop(n, SlidingModeController((1, 2, 2, 1), 0.02, 5.0)) for n in (2, 150))
-    assert_same({k: v for k, v in small.metrics.items()}, {k: v[:2] for k, v in large.metrics.items()})
+    assert_same(dict(small.metrics.items()), {k: v[:2] for k, v in large.metrics.items()})
 
 
 def test_a_rollout_wants_one_episode_a_slot(make_vec):
@@ -168,7 +168,7 @@ def test_more_runs_add_to_those_that_were_there():
 def outcome(small, level, arm, values, failed=None):
     group = study.Group(small, "lqr", level, "", arm, len(values))
     values = np.array(values, dtype=float)
-    metrics = {name: values for name in tables.NAMES}
+    metrics = dict.fromkeys(tables.NAMES, values)
     return study.Outcome(group, metrics, np.zeros(len(values), dtype=bool) if failed is None else np.array(failed))
 
 
@@ -223,7 +223,7 @@ def test_intervals_hold_the_mean_as_often_as_they_say(small):
     held = 0
     for _ in range(200):
         values = rng.normal(1.0, 0.1, 30)
-        (low, high) = statistics._interval((values,), lambda x, axis: np.mean(x, axis=axis))
+        (low, high) = statistics._interval((values,), statistics._mean)
         held += low <= 1.0 <= high
     assert 178 <= held <= 199
 

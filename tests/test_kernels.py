@@ -101,7 +101,9 @@ def test_a_change_of_the_equations_is_never_hidden_by_the_cache(tmp_path):
     shutil.copytree(Path(smo_gym.__file__).parent, tmp_path / "smo_gym", ignore=shutil.ignore_patterns("__pycache__"))
 
     def run():
-        return subprocess.run([sys.executable, "-c", _PROBE], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+        return subprocess.run(
+            [sys.executable, "-c", _PROBE], cwd=tmp_path, check=True, capture_output=True, text=True
+        ).stdout
 
     before = run()
     assert list((tmp_path / "smo_gym" / "__pycache__").glob("plant._advance*.nbc"))

@@ -28,9 +28,7 @@ def test_equations_follow_from_the_lagrangian():
     bob = sympy.Matrix([h + l * sympy.sin(theta), l * sympy.cos(theta)])  # theta from the upward vertical
     speed = bob.diff(t)
     lagrangian = M_c * h.diff(t) ** 2 / 2 + m * speed.dot(speed) / 2 - m * g * bob[1]
-    equations = [
-        (lagrangian.diff(q.diff(t)).diff(t) - lagrangian.diff(q) - force) for q, force in ((h, F), (theta, 0))
-    ]
+    equations = [(lagrangian.diff(q.diff(t)).diff(t) - lagrangian.diff(q) - force) for q, force in ((h, F), (theta, 0))]
     accelerations = sympy.solve(equations, [h.diff(t, 2), theta.diff(t, 2)])
     states = sympy.symbols("h theta v omega")
     substitution = [(h.diff(t), states[2]), (theta.diff(t), states[3]), (h, states[0]), (theta, states[1])]

@@ -1,5 +1,6 @@
 """The observer against samples computed by hand, its theorem, and its refusals."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -60,7 +61,7 @@ def test_samples_computed_by_hand(column, compensation):
     xhat0, u = (0.1, -0.5, 0.2, 0.4), -7.0
     observer = SlidingModeObserver(gains=column, compensation=compensation, slopes=(12.3, 17.0))
     expected = np.array(xhat0)
-    for y0, y1 in zip(SAMPLES[:-1], SAMPLES[1:], strict=True):
+    for y0, y1 in itertools.pairwise(SAMPLES):
         expected = by_hand(expected, y0, y1, u, Gains.of(column), (12.3, 17.0), compensation, DT)
     np.testing.assert_allclose(update(observer, u, xhat0=xhat0), expected, rtol=1e-13, atol=1e-15)
 
@@ -69,7 +70,7 @@ def test_its_own_step_divides_the_sampling_period():
     gains = Gains((2.0, 2.0), (1.0, 2.0), (0.3, 0.4))
     observer = SlidingModeObserver(gains=gains, slopes=(12.0, 15.0), step=DT / 4)
     expected = np.zeros(4)
-    for y0, y1 in zip(SAMPLES[:-1], SAMPLES[1:], strict=True):
+    for y0, y1 in itertools.pairwise(SAMPLES):
         for j in range(4):
             a, b = (y0 + s / 4 * (y1 - y0) for s in (j, j + 1))
             expected = by_hand(expected, a, b, 9.0, gains, (12.0, 15.0), True, DT / 4)
@@ -80,7 +81,7 @@ def test_low_pass_filters_the_mean_injection_of_each_step():
     gains, tau = Gains.of("lqr"), 0.004
     observer = SlidingModeObserver(gains=gains, slopes=(12.0, 15.0), time_constant=tau)
     expected, psi = np.zeros(4), np.zeros(2)
-    for y0, y1 in zip(SAMPLES[:-1], SAMPLES[1:], strict=True):
+    for y0, y1 in itertools.pairwise(SAMPLES):
         after = by_hand(expected, y0, y1, 3.0, gains, (12.0, 15.0), True, DT, psi=psi)
         psi = psi + (1 - math.exp(-DT / tau)) * ((after[:2] - expected[:2]) / DT - psi)
         expected = after
@@ -111,7 +112,13 @@ def test_each_slot_may_have_its_own_settings():
 def closed_loop(observer, x0, duration, dt):
     """True states and estimates at every sample, and forces, of an LQR run on a plant that is 10 % off."""
     env = gymnasium.make(
-        "SMOPendulum-v0", control_period=dt, dt=dt, horizon=duration, force_limit=None, track_limit=None, uncertainty=0.0
+        "SMOPendulum-v0",
+        control_period=dt,
+        dt=dt,
+        horizon=duration,
+        force_limit=None,
+        track_limit=None,
+        uncertainty=0.0,
     )
     env = ObserverWrapper(env, observer)
     plant = CartPendulum().perturbed([0.1, -0.1, 0.1])

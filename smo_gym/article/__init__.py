@@ -43,9 +43,14 @@ class Cell:
     state: str
     compensation: str
 
+    @property
+    def is_average(self) -> bool:
+        """Whether it is in the row of averages of its table."""
+        return "average" in (self.uncertainty_percent, self.case)
+
 
 @cache
 def published() -> dict[Cell, float]:
     """The 176 printed cells of Tables 4, 5 and 7 (104 MSE, 72 RMS)."""
-    with resources.files(__package__).joinpath("published.csv").open(encoding="utf-8", newline="") as file:
-        return {Cell(**row): float(value) for row in csv.DictReader(file) for value in [row.pop("value")]}
+    text = resources.files(__package__).joinpath("published.csv").read_text(encoding="utf-8")
+    return {Cell(**row): float(value) for row in csv.DictReader(text.splitlines()) for value in [row.pop("value")]}

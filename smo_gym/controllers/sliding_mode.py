@@ -87,7 +87,8 @@ class SlidingModeController:
         return (u if observation.ndim == 2 else u[0]), (integral,)
 
     def __repr__(self) -> str:
-        return f"SlidingModeController(k={self.k.tolist()}, dt={self.dt}, slope={self.slope}, Z0={self.Z0}, lam={self.lam}, epsilon={self.epsilon})"
+        settings = {name: getattr(self, name) for name in ("dt", "slope", "Z0", "lam", "epsilon")}
+        return f"SlidingModeController(k={self.k.tolist()}, {', '.join(f'{k}={v}' for k, v in settings.items())})"
 
 
 @kernel

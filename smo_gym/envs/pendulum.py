@@ -50,18 +50,18 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
 
     ## Rewards
 
-    `-control_period (q . x^2 + r F^2)` with q = (1, 1, 0.1, 0.1) on (h, theta, h', theta') and r = 0.001, x at the end of the
-    control period; 100 less when the episode terminates. See :class:`~smo_gym.envs.task.Reward`.
+    `-control_period (q . x^2 + r F^2)` with q = (1, 1, 0.1, 0.1) on (h, theta, h', theta') and r = 0.001, x at the end
+    of the control period; 100 less when the episode terminates. See :class:`~smo_gym.envs.task.Reward`.
 
     ## Starting State
 
-    Drawn from the box `initial_state`: by default the one that the four cases of the article's Table 5 span, h and theta
-    in [-1, 1], h' = 0.1, theta' = 0.01; upright, theta in [-0.2, 0.2] and the rest zero.
+    Drawn from the box `initial_state`: by default the one that the four cases of the article's Table 5 span, h and
+    theta in [-1, 1], h' = 0.1, theta' = 0.01; upright, theta in [-0.2, 0.2] and the rest zero.
 
     ## Episode End
 
-    Termination: the cart leaves the track (`|h| > track_limit`), the rod falls (`|theta| > angle_limit`; pi/2 upright, no
-    limit hanging) or the state is not finite. Truncation: after `horizon` seconds. Reaching the goal ends nothing.
+    Termination: the cart leaves the track (`|h| > track_limit`), the rod falls (`|theta| > angle_limit`; pi/2 upright,
+    no limit hanging) or the state is not finite. Truncation: after `horizon` seconds. Reaching the goal ends nothing.
 
     ## Information
 
@@ -74,7 +74,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
     |----------|---------|---------|
     | `control_period` | 0.02 | s; the force is held over it; a whole multiple of `dt` |
     | `dt` | 0.001 | s; Runge-Kutta step of the plant and sampling period of the encoders |
-    | `params` | Table 2 | nominal plant: :class:`smo_gym.CartPendulum`, or a mapping of `cart_mass, bob_mass, rod_length, gravity` |
+    | `params` | Table 2 | nominal plant, or a mapping of `cart_mass`, `bob_mass`, `rod_length`, `gravity` |
     | `uncertainty` | 0.1 | x in [0, 1) |
     | `initial_state` | see above | one state (4,) or a box (2, 4) of [low, high] |
     | `force_limit` | 30 | N; None for no limit |

@@ -68,9 +68,9 @@ class Task:
     params: CartPendulum = field(default_factory=CartPendulum)
     uncertainty: float = 0.1
     initial_state: Any = ((-1.0, -1.0, 0.1, 0.01), (1.0, 1.0, 0.1, 0.01))
-    force_limit: float | None = 30.0
-    track_limit: float | None = 5.0
-    angle_limit: float | None = None
+    force_limit: float = 30.0
+    track_limit: float = 5.0
+    angle_limit: float = math.inf
     horizon: float = 35.0
     reward: Reward = field(default_factory=Reward)
 
@@ -126,14 +126,13 @@ class Task:
         return multiple("horizon", self.horizon, "control_period", self.control_period)
 
     @property
-    def observation_space(self) -> spaces.Box:
+    def observation_space(self) -> spaces.Space[Array]:
         """[h, theta]: encoders count without end."""
         return spaces.Box(-np.inf, np.inf, (2,), np.float64)
 
     @property
-    def action_space(self) -> spaces.Box:
+    def action_space(self) -> spaces.Space[Array]:
         """The force in N."""
-        assert self.force_limit is not None
         return spaces.Box(-self.force_limit, self.force_limit, (1,), np.float64)
 
     def draw(self, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -72,7 +72,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self._truncated = np.zeros(num_envs, dtype=np.bool_)
         self._everywhere = np.ones(num_envs, dtype=np.bool_)
 
-    @property
+    @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
         """One generator a slot."""
         return tuple(self._generators)
@@ -181,7 +181,8 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         """Options slot by slot: an array with a leading axis of slots is taken apart, anything else is for all."""
         n = self.num_envs
         return [
-            {name: value[i] if np.shape(value) == (n, 4) else value for name, value in options.items()} for i in range(n)
+            {name: value[i] if np.shape(value) == (n, 4) else value for name, value in options.items()}
+            for i in range(n)
         ]
 
     def _still(self) -> Array:

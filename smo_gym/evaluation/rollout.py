@@ -88,7 +88,7 @@ def rollout(
     observation, info = env.reset(seed=seed, options=dict(options or {}))
     sums = metrics.start(n)
     trace = _Recorder(trace_every, task, observation, info)
-    failed = np.zeros(n, dtype=np.bool_)
+    failed: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
     first, agent_state = np.ones(n, dtype=np.bool_), None
     later = ~first
     failures = 0
@@ -97,13 +97,13 @@ def rollout(
         first = later
         if failures:
             action = np.where(failed[:, None], 0.0, action)
-        observation, _, terminated, _, info = env.step(action)
+        observation, _, ended, _, info = env.step(action)
         metrics.add(sums, info, observation, failed)
-        failed = terminated
+        failed = ended.astype(np.bool_, copy=False)
         trace.record(k, observation, info)
         if k % 100 == 0:
             progress(100)
-        failures = np.count_nonzero(failed)
+        failures = int(np.count_nonzero(failed))
         if failures == n:
             break
     progress(task.steps % 100)

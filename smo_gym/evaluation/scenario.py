@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Generic, Literal, TypeVar, Union, get_args
+from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -73,7 +73,7 @@ class SmcSettings(_Strict):
         )
 
 
-ControllerSettings = Annotated[Union[LqrSettings, SmcSettings], Field(discriminator="law")]
+ControllerSettings = Annotated[LqrSettings | SmcSettings, Field(discriminator="law")]
 
 
 class Scenario(_Strict):

@@ -89,7 +89,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
     values = np.mean([np.where(row.failed, np.nan, row.metrics[f"mse_{state}"]) for row in rows], axis=0)
     complete = values[np.isfinite(values)]
     measured = float(np.mean([_mean_of(row, state) for row in rows]))
-    low, high = _interval((complete,), lambda x, axis: np.mean(x, axis=axis))
+    low, high = _interval((complete,), _mean)
     mse = Result(
         cell=cell,
         published=_published(rows, state, cell),
@@ -104,8 +104,16 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
         return [mse]
     rms_cell = replace(cell, metric="rms")
     printed = _published(rows, state, rms_cell)
-    numbers = {name: math.sqrt(getattr(mse, name)) for name in ("measured", "ci_low", "ci_high", "median")}
-    return [mse, replace(mse, cell=rms_cell, published=printed, **numbers)]
+    rms = replace(
+        mse,
+        cell=rms_cell,
+        published=printed,
+        measured=math.sqrt(mse.measured),
+        ci_low=math.sqrt(mse.ci_low),
+        ci_high=math.sqrt(mse.ci_high),
+        median=math.sqrt(mse.median),
+    )
+    return [mse, rms]
 
 
 def _published(rows: Sequence[Outcome], state: str, cell: Cell) -> float:
@@ -149,6 +157,10 @@ def _reduction(rows: Sequence[Outcome], state: str, uncertainty: str, case: str)
             failures=int((~both).sum()),
         )
     ]
+
+
+def _mean(values: Array, axis: int) -> Array:
+    return np.asarray(np.mean(values, axis=axis))
 
 
 def _interval(samples: tuple[Array, ...], statistic: Callable[..., Array]) -> tuple[float, float]:

@@ -123,4 +123,3 @@ def _run(batch: Sequence[Group], seed: int, progress: Callable[[float], object])
     return [
         Outcome(group, {name: parts[i] for name, parts in columns.items()}, failed[i]) for i, group in enumerate(batch)
     ]
-

@@ -16,7 +16,8 @@ from .metrics import NAMES
 from .statistics import Result
 from .study import ARMS, Outcome
 
-_SYMBOL = {"h": "h", "theta": "theta"}
+_HEADER = ("", "state", "compensation", "published", "measured", "95 % interval", "median", "ratio", "failed")
+_REDUCTION_HEADER = ("", "state", "published %", "measured %", "95 % interval", "median")
 _REDUCTION = "mse_reduction_percent"
 
 
@@ -39,34 +40,29 @@ def render(results: Sequence[Result], form: str, *, rms: bool) -> str:
     for (table, controller), rows in _by_table(results).items():
         parts.append(_heading(f"Table {table}, {controller.upper()}", form))
         shown = [row for row in rows if row.cell.metric == "mse" or (rms and row.cell.metric == "rms")]
-        header = ("", "state", "compensation", "published", "measured", "95 % interval", "median", "ratio", "failed")
-        parts.append(_table(form, header, [_cell_row(row) for row in shown]))
+        parts.append(_table(form, _HEADER, [_cell_row(row) for row in shown]))
         reductions = [row for row in rows if row.cell.metric == _REDUCTION]
         if reductions:
-            header = ("", "state", "published %", "measured %", "95 % interval", "median")
             parts.append(_heading("Reduction of the MSE by the compensation", form, level=3))
-            parts.append(_table(form, header, [_reduction_row(row) for row in reductions]))
+            parts.append(_table(form, _REDUCTION_HEADER, [_reduction_row(row) for row in reductions]))
         parts.append(verdict(rows))
     return "\n\n".join(parts) + "\n"
 
 
 def verdict(rows: Sequence[Result]) -> str:
-    """One sentence on how one controller's table compares with the published one."""
-    cells = [row for row in rows if row.cell.metric == "mse" and math.isfinite(row.deviation) and not _is_average(row.cell)]
-    runs = sum(row.runs for row in rows if row.cell.metric == "mse" and row.cell.state == "h" and not _is_average(row.cell))
-    failures = sum(
-        row.failures for row in rows if row.cell.metric == "mse" and row.cell.state == "h" and not _is_average(row.cell)
-    )
-    failed = f"{failures} of {runs} runs failed."
-    if not cells:
+    """How one controller's table compares with the published one, in a sentence."""
+    mse = [row for row in rows if row.cell.metric == "mse"]
+    counted = [row for row in mse if row.cell.state == "h" and not row.cell.is_average]
+    failed = f"{sum(row.failures for row in counted)} of {sum(row.runs for row in counted)} runs failed."
+    off = np.array([row.deviation for row in mse if not row.cell.is_average and math.isfinite(row.deviation)])
+    averages = [row.deviation for row in mse if row.cell.is_average and math.isfinite(row.deviation)]
+    if not off.size:
         return f"No published cell to compare with. {failed}"
-    deviations = np.array([row.deviation for row in cells])
-    ratios = np.exp(deviations)
-    averages = [row for row in rows if row.cell.metric == "mse" and math.isfinite(row.deviation) and _is_average(row.cell)]
+    furthest = off[np.argmax(np.abs(off))]
     return (
-        f"{len(cells)} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(deviations**2)):.1f} %, "
-        f"{np.sum(np.abs(ratios - 1.0) <= 0.1)} within 10 %, furthest off {100 * (ratios[np.argmax(np.abs(deviations))] - 1):+.1f} %; "
-        f"averages off {', '.join(f'{100 * (math.exp(row.deviation) - 1):+.1f} %' for row in averages)}. {failed}"
+        f"{off.size} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(off**2)):.1f} %, "
+        f"{np.count_nonzero(np.abs(np.expm1(off)) <= 0.1)} within 10 %, furthest off {100 * np.expm1(furthest):+.1f} %; "
+        f"averages off {', '.join(f'{100 * np.expm1(average):+.1f} %' for average in averages)}. {failed}"
     )
 
 
@@ -84,8 +80,9 @@ def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
                 and o.group.uncertainty > 0.0
             ]
             if chosen:
-                means = [np.mean(np.concatenate([o.metrics[name][~o.failed] for o in chosen])) for name in _DIAGNOSTICS]
-                rows.append((table, controller.upper(), arm, *(f"{mean:.3g}" for mean in means)))
+                columns = [np.concatenate([o.metrics[name][~o.failed] for o in chosen]) for name in _DIAGNOSTICS]
+                means = [f"{values.mean():.3g}" if values.size else "" for values in columns]
+                rows.append((table, controller.upper(), arm, *means))
     return _table(form, header, rows)
 
 
@@ -103,7 +100,7 @@ _DIAGNOSTICS = {
 
 
 def results_csv(results: Sequence[Result]) -> str:
-    """One line a result: the columns of the published data, then published, measured, ci_low, ci_high, runs, failures, median."""
+    """One line a result: the columns of the published data, then what stands beside it."""
     numbers = ("published", "measured", "ci_low", "ci_high", "runs", "failures", "median")
     header = [*(field.name for field in fields(Cell)), *numbers]
     return _csv(header, ([*asdict(r.cell).values(), *(_exact(getattr(r, name)) for name in numbers)] for r in results))
@@ -138,12 +135,8 @@ def _exact(value: float) -> object:
     return repr(float(value)) if math.isfinite(value) else ""
 
 
-def _is_average(cell: Cell) -> bool:
-    return "average" in (cell.uncertainty_percent, cell.case)
-
-
 def _label(cell: Cell) -> str:
-    if _is_average(cell):
+    if cell.is_average:
         return "average"
     parts = [f"case {cell.case}"] * bool(cell.case) + [f"{cell.uncertainty_percent} %"] * bool(cell.uncertainty_percent)
     return ", ".join(parts)
@@ -190,4 +183,6 @@ def _heading(text: str, form: str, level: int = 2) -> str:
 
 
 def _table(form: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return tabulate(rows, header, tablefmt=form, disable_numparse=True, colalign=["left"] * 2 + ["right"] * (len(header) - 2))
+    return tabulate(
+        rows, header, tablefmt=form, disable_numparse=True, colalign=["left"] * 2 + ["right"] * (len(header) - 2)
+    )

@@ -40,7 +40,7 @@ def kernel(function: F) -> F:
     Numba recompiles when the kernel's own file changes but does not see a change in what the kernel inlines. The cache
     is therefore stamped with the sources of this package too, so that no stale physics is ever run.
     """
-    dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
     dispatcher.enable_caching()
     try:
         index = dispatcher._cache._cache_file

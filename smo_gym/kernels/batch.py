@@ -5,6 +5,7 @@ row r starts at ``r * LANES``. All its accesses are then constant offsets into o
 run-time checks that lanes are independent and vectorises the loop over them.
 """
 
+import itertools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -81,7 +82,7 @@ def for_slots(kernel: Callable[..., None], n: int, microseconds_a_slot: float, *
         kernel(0, n, *args)
         return
     bounds = [min(n, LANES * (blocks * k // threads)) for k in range(threads + 1)]
-    others = [_pool.get().submit(kernel, a, b, *args) for a, b in zip(bounds[1:-1], bounds[2:], strict=True)]
+    others = [_pool.get().submit(kernel, a, b, *args) for a, b in itertools.pairwise(bounds)]
     kernel(bounds[0], bounds[1], *args)
     for other in others:
         other.result()

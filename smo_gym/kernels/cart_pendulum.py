@@ -24,7 +24,7 @@ def drift_and_gain(
 def plant(
     x: tuple[float, float, float, float], s: float, inputs: tuple[float, float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """x' = f(x) + g(x) u, equations (3)-(6) and (8), for ``inputs = (u, M_c, m, l, g)``."""
+    """X' = f(x) + g(x) u, equations (3)-(6) and (8), for ``inputs = (u, M_c, m, l, g)``."""
     _, theta, v, omega = x
     u, M_c, m, l, g = inputs
     f_h, f_theta, g_h, g_theta = drift_and_gain(theta, omega, M_c, m, l, g)

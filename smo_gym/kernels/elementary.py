@@ -6,12 +6,16 @@ The polynomials are near-minimax (interpolation at Chebyshev nodes in 50 digits)
 """
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 from numba import types
-from numba.extending import intrinsic
+from numba.extending import intrinsic as _intrinsic
 
 from . import inlined
+
+# Numba's own types describe the generator, not the function that it makes.
+intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = _intrinsic
 
 # Adding 1.5 * 2**52 rounds to an integer and leaves that integer in the low bits of the sum.
 _ROUND = 6755399441055744.0

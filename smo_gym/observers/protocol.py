@@ -24,8 +24,10 @@ class Period(NamedTuple):
 class Estimator(Protocol):
     """An observer at work on n slots."""
 
-    xhat: Array
-    """The estimates [h, theta, h', theta'], (4, n)."""
+    @property
+    def xhat(self) -> Array:
+        """The estimates [h, theta, h', theta'], (4, n)."""
+        ...
 
     def reset(self, slots: NDArray[np.bool_]) -> None:
         """Start the marked slots, (n,), anew."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -46,12 +46,11 @@ class Gains:
     beta_2: tuple[float, float]
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            values = array(field.name, getattr(self, field.name), (2,))
-            if (values < 0.0).any() or (field.name == "m1" and (values == 0.0).any()):
-                allowed = "positive" if field.name == "m1" else "at least 0"
-                raise ValueError(f"{field.name}={values.tolist()} must be {allowed}")
-            object.__setattr__(self, field.name, tuple(values.tolist()))
+        for name in ("m1", "beta_1", "beta_2"):
+            values = array(name, getattr(self, name), (2,))
+            if (values < 0.0).any() or (name == "m1" and (values == 0.0).any()):
+                raise ValueError(f"{name}={values.tolist()} must be {'positive' if name == 'm1' else 'at least 0'}")
+            object.__setattr__(self, name, tuple(values.tolist()))
 
     @classmethod
     def of(cls, gains: str | Gains | Mapping[str, ArrayLike]) -> Gains:
@@ -64,7 +63,7 @@ class Gains:
             return gains
         if isinstance(gains, str):
             return cls(**OBSERVER_GAINS[choice("column of Table 3", gains, OBSERVER_GAINS)])
-        known = [field.name for field in fields(cls)]
+        known = [f.name for f in fields(cls)]
         for name in gains:
             if name not in known:
                 raise ValueError(unknown("observer gain", name, known))
@@ -108,7 +107,7 @@ class SlidingModeObserver:
     time_constant: float = 0.0
     step: float | None = None
     xhat0: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    model: CartPendulum = CartPendulum()
+    model: CartPendulum = field(default_factory=CartPendulum)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gains", Gains.of(self.gains))
@@ -232,7 +231,7 @@ class _Bank:
 def _estimate(
     xhat: tuple[float, float, float, float], s: float, inputs: tuple[float, ...]
 ) -> tuple[float, float, float, float]:
-    """xhat' of (34)-(35), the measurement on the line between two samples."""
+    """Xhat' of (34)-(35), the measurement on the line between two samples."""
     h, theta, v, omega = xhat
     (h0, theta0, h1, theta1, u, m1_h, m1_theta, m2_h, m2_theta, k_p, k_v, held, psi_h, psi_theta, M_c, m, l, g) = inputs
     h_dot = m1_h * tanh(k_p * (h0 + s * (h1 - h0) - h))
