@@ -82,7 +82,7 @@ def for_slots(kernel: Callable[..., None], n: int, microseconds_a_slot: float, *
         kernel(0, n, *args)
         return
     bounds = [min(n, LANES * (blocks * k // threads)) for k in range(threads + 1)]
-    others = [_pool.get().submit(kernel, a, b, *args) for a, b in itertools.pairwise(bounds)]
+    others = [_pool.get().submit(kernel, a, b, *args) for a, b in itertools.pairwise(bounds[1:])]
     kernel(bounds[0], bounds[1], *args)
     for other in others:
         other.result()
