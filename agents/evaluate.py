@@ -135,6 +135,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     observers = tuple(ARMS) if args.observer == "all" else (args.observer,)
     arms = [arm for observer in observers for arm in ARMS[observer][args.compensation]]
     groups = study.groups(scenarios, controllers, arms, args.runs)
+    runs = sum(group.runs for group in groups)
+    print(f"{runs} runs to do", file=sys.stderr, flush=True)
     try:
         with tqdm(
             total=study.simulated_seconds(groups),
@@ -163,7 +165,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     files.write(out / "tables.md", tables.render(numbers, "github", rms=True) + f"\n## Diagnostics\n\n{notes}\n")
     files.write(out / "tables.tex", tables.render(numbers, "latex_booktabs", rms=True))
     files.write(out / "settings.yaml", yaml.safe_dump(resolved, sort_keys=False))
-    runs = sum(group.runs for group in groups)
     print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {out}")
     return 0
 

@@ -76,11 +76,11 @@ def set_threads(threads: int) -> None:
 
 def for_slots(kernel: Callable[..., None], n: int, microseconds_a_slot: float, *args: Any) -> None:
     """Run ``kernel(start, stop, *args)`` over slots 0 to n, in threads of whole blocks where the work is worth it."""
-    blocks = -(-n // LANES)
-    threads = min(_pool.threads, blocks)
-    if threads == 1 or n * microseconds_a_slot < _WORTH_A_THREAD:
+    if n * microseconds_a_slot < _WORTH_A_THREAD or n <= LANES or _pool.threads == 1:
         kernel(0, n, *args)
         return
+    blocks = -(-n // LANES)
+    threads = min(_pool.threads, blocks)
     bounds = [min(n, LANES * (blocks * k // threads)) for k in range(threads + 1)]
     others = [_pool.get().submit(kernel, a, b, *args) for a, b in itertools.pairwise(bounds[1:])]
     kernel(bounds[0], bounds[1], *args)
