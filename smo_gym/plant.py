@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass, fields, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .kernels import kernel
+from .kernels import kernel, plain
 from .kernels.batch import LANES, for_slots, load, store
-from .kernels.cart_pendulum import drift_and_gain
+from .kernels.cart_pendulum import drift_and_gain, energy
 from .kernels.cart_pendulum import plant as _plant
 from .kernels.rk4 import rk4
 from .validation import array, number, unknown
@@ -96,9 +96,7 @@ class CartPendulum:
         ``(M_c + m) h'^2 / 2 + m l^2 theta'^2 / 2 + m l h' theta' cos theta + m g l cos theta``
         """
         _, theta, v, omega = np.asarray(x, dtype=np.float64)
-        M_c, m, l, g = self.as_array()
-        kinetic = 0.5 * (M_c + m) * v**2 + 0.5 * m * l**2 * omega**2 + m * l * v * omega * np.cos(theta)
-        return np.asarray(kinetic + m * g * l * np.cos(theta))
+        return np.asarray(plain(energy)(np.cos(theta), v, omega, *self.as_array()))
 
     def drift(self, x: ArrayLike) -> Array:
         """f(x) of equation (10) for states (4, n) or (4,), of the same shape."""

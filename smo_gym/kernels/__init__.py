@@ -34,6 +34,11 @@ def inlined(function: F) -> F:
     return cast(F, numba.njit(error_model="numpy", forceinline=True)(function))
 
 
+def plain(function: F) -> F:
+    """The Python function behind an inlined one, for arrays and symbols."""
+    return cast(F, function.py_func)  # type: ignore[attr-defined]
+
+
 def kernel(function: F) -> F:
     """Compile a loop over a batch; it runs without the GIL and is cached on disk.
 

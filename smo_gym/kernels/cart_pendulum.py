@@ -5,19 +5,35 @@ from .elementary import sincos
 
 
 @inlined
-def drift_and_gain(
-    theta: float, omega: float, M_c: float, m: float, l: float, g: float
+def control_affine(
+    sin: float, cos: float, omega: float, M_c: float, m: float, l: float, g: float
 ) -> tuple[float, float, float, float]:
     """``f2 = (f_h, f_theta)`` of equation (12) and ``g2 = (g_h, g_theta)`` of (18): X2' = f2(x) + g2(x) u.
 
-    The four denominators are one, ``l (M_c + m sin^2 theta)``, up to a factor l.
+    The four denominators are one, ``l (M_c + m sin^2 theta)``, up to a factor l. Arithmetic alone: :func:`plain` of
+    it takes arrays and symbols too.
     """
-    sin, cos = sincos(theta)
     per = 1.0 / (l * (M_c + m * sin * sin))
     centrifugal = m * l * omega * omega * sin
     f_h = (centrifugal - m * g * sin * cos) * l * per
     f_theta = ((M_c + m) * g * sin - centrifugal * cos) * per
     return f_h, f_theta, l * per, -cos * per
+
+
+@inlined
+def energy(cos: float, v: float, omega: float, M_c: float, m: float, l: float, g: float) -> float:
+    """Kinetic and potential energy, the integrand of equation (53)."""
+    kinetic = 0.5 * (M_c + m) * v * v + 0.5 * m * l * l * omega * omega + m * l * v * omega * cos
+    return kinetic + m * g * l * cos
+
+
+@inlined
+def drift_and_gain(
+    theta: float, omega: float, M_c: float, m: float, l: float, g: float
+) -> tuple[float, float, float, float]:
+    """:func:`control_affine` at an angle."""
+    sin, cos = sincos(theta)
+    return control_affine(sin, cos, omega, M_c, m, l, g)
 
 
 @inlined

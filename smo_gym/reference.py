@@ -1,0 +1,151 @@
+"""Minimum-energy reference trajectories, equation (53), by direct collocation.
+
+The article used DYNOPT: orthogonal collocation on finite elements with the force constant in each element. So do we,
+with CasADi and IPOPT (the extra ``reference``). A solution is its force; the states are what our own plant makes of it.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .kernels import plain
+from .kernels.cart_pendulum import control_affine, energy
+from .plant import CartPendulum, advance
+from .validation import array, multiple, number
+
+Array = NDArray[np.float64]
+_DEGREE = 4  # Radau points in an element
+
+
+class ReferenceNotFound(RuntimeError):
+    """The optimiser found no trajectory; the message carries its reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """A trajectory of the nominal plant from one state to another, then rest.
+
+    Args:
+        x0: start, shape (4,).
+        xT: end, shape (4,).
+        horizon: T in s.
+        force_limit: bound of \\|F\\| in N.
+        cost: J of equation (53) in J s.
+        u: force in N in each of equally long elements.
+    """
+
+    x0: tuple[float, ...]
+    xT: tuple[float, ...]
+    horizon: float
+    force_limit: float
+    cost: float
+    u: tuple[float, ...]
+
+    def trajectory(self, dt: float, model: CartPendulum | None = None) -> Array:
+        """States x_d (4, N + 1) at 0, dt, ..., T: the model integrated with Runge-Kutta steps of ``dt`` under the force.
+
+        Raises:
+            ValueError: an element is no whole number of steps.
+        """
+        steps = multiple("element", self.horizon / len(self.u), "dt", dt)
+        params = (model or CartPendulum()).as_array()[:, None]
+        x = np.array(self.x0)[:, None]
+        states, sample = [x[:, 0].copy()], np.empty((1, 2, 1))
+        for u in np.repeat(self.u, steps):
+            advance(x, params, np.array([u]), dt, sample)
+            states.append(x[:, 0].copy())
+        return np.array(states).T
+
+    def to_json(self) -> str:
+        """Text that :meth:`from_json` reads back to the same numbers."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Reference:
+        """The reference that :meth:`to_json` wrote."""
+        data = json.loads(text)
+        return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in data.items()})
+
+
+def shipped() -> Reference:
+    """The reference of the tracking tables, as computed by ``agents/reference.py``; no solver is needed."""
+    return Reference.from_json(resources.files(__package__).joinpath("article", "reference.json").read_text())
+
+
+def minimum_energy(
+    x0: ArrayLike,
+    xT: ArrayLike = (0.0, 0.0, 0.0, 0.0),
+    horizon: float = 8.0,
+    force_limit: float = 26.0,
+    elements: int = 160,
+    model: CartPendulum | None = None,
+) -> Reference:
+    """Minimise the time integral of the energy (53) subject to (3)-(6), the two states and ``|F| <= force_limit``.
+
+    (53) has no cost of control, so the force must be bounded.
+
+    Args:
+        x0: initial state, shape (4,).
+        xT: final state, shape (4,).
+        horizon: T in s.
+        force_limit: in N.
+        elements: finite elements, each with a constant force.
+        model: plant (Table 2 by default).
+
+    Raises:
+        ValueError: an argument is not allowed.
+        ReferenceNotFound: no trajectory joins the states within the bounds, or IPOPT gave up; with its reason.
+        ImportError: CasADi is missing.
+    """
+    start, end = array("x0", x0, (4,)), array("xT", xT, (4,))
+    T = number("horizon", horizon, above=0.0)
+    bound = number("force_limit", force_limit, above=0.0)
+    if not isinstance(elements, int) or elements < 1:
+        raise ValueError(f"elements={elements!r} must be a positive integer")
+    try:
+        import casadi
+    except ImportError:
+        raise ImportError('minimum_energy needs CasADi: pip install "smo_gym[reference]"') from None
+    parameters = (model or CartPendulum()).as_array().tolist()
+
+    def rates(x: Any, u: Any) -> Any:
+        f_h, f_theta, g_h, g_theta = plain(control_affine)(casadi.sin(x[1]), casadi.cos(x[1]), x[3], *parameters)
+        return casadi.vertcat(x[2], x[3], f_h + g_h * u, f_theta + g_theta * u)
+
+    points = casadi.collocation_points(_DEGREE, "radau")
+    C, _, B = casadi.collocation_coeff(points)
+    h = T / elements
+    problem = casadi.Opti()
+    u = problem.variable(elements)
+    x = problem.variable(4, elements * _DEGREE + 1)  # the last point of an element is the first of the next
+    cost = 0
+    for k in range(elements):
+        inside = x[:, k * _DEGREE : (k + 1) * _DEGREE + 1]
+        slopes = casadi.mtimes(inside, C)
+        for j in range(_DEGREE):
+            state = inside[:, j + 1]
+            problem.subject_to(slopes[:, j] == h * rates(state, u[k]))
+            cost += h * B[j] * plain(energy)(casadi.cos(state[1]), state[2], state[3], *parameters)
+    problem.minimize(cost)
+    problem.subject_to(x[:, 0] == start)
+    problem.subject_to(x[:, -1] == end)
+    problem.subject_to(problem.bounded(-bound, u, bound))
+    problem.set_initial(x, start[:, None] + np.linspace(0.0, 1.0, elements * _DEGREE + 1) * (end - start)[:, None])
+    quiet = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 1000}}
+    problem.solver("ipopt", quiet)
+    try:
+        solution = problem.solve()
+    except RuntimeError:
+        reason = problem.return_status().replace("_", " ").lower()
+        raise ReferenceNotFound(
+            f"no minimum-energy trajectory from {start.tolist()} to {end.tolist()} in {T:g} s with |F| <= {bound:g} N: "
+            f"IPOPT says {reason!r}"
+        ) from None
+    forces = np.atleast_1d(solution.value(u))
+    return Reference(tuple(start.tolist()), tuple(end.tolist()), T, bound, float(solution.value(cost)), tuple(forces.tolist()))
