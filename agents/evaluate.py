@@ -24,7 +24,6 @@ from smo_gym.validation import unknown
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions")
-CONTROLLERS = ("lqr", "smc")
 ARMS: dict[str, dict[str, tuple[str, ...]]] = {
     "smo": {"on": ("with",), "off": ("without",), "both": ("without", "with")},
     "oracle": {"on": ("oracle",), "off": ("oracle",), "both": ("oracle",)},
@@ -37,12 +36,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
     )
     add = parser.add_argument
-    add(
-        "--controller",
-        type=one_of("controller", (*CONTROLLERS, "all")),
-        default="all",
-        help="lqr, smc or all (default)",
-    )
+    add("--controller", default="all", help="lqr, smc, a controller of the scenario's by name, or all (default)")
     add(
         "--scenario",
         type=one_of("scenario", (*SCENARIOS, "all")),
@@ -116,8 +110,22 @@ def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
     paths = [arguments.config] if arguments.config else [CONFIGS / f"{name}.yaml" for name in names]
     found = [scenario.load(path) for path in paths]
     if arguments.uncertainty is not None:
-        levels = scenario.Setting[tuple[float, ...]](value=tuple(arguments.uncertainty), source="chosen")
+        wanted = tuple(dict.fromkeys(arguments.uncertainty))
+        levels = scenario.Setting[tuple[float, ...]](value=wanted, source="chosen", note="command line")
         found = [one.model_copy(update={"uncertainty": levels}) for one in found]
+    return found
+
+
+def chosen(scenarios: Sequence[scenario.Scenario], controller: str) -> list[str]:
+    """Names of the controllers that a name or a law stands for.
+
+    Raises:
+        ValueError: no scenario has such a controller.
+    """
+    laws = {name: settings.law for one in scenarios for name, settings in one.controllers.items()}
+    found = [name for name, law in laws.items() if controller in (name, law, "all")]
+    if not found:
+        raise ValueError(unknown("controller", controller, {*laws, *laws.values(), "all"}))
     return found
 
 
@@ -127,17 +135,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     began = time.perf_counter()
     try:
         scenarios = load(args)
+        controllers = chosen(scenarios, args.controller)
         out = files.prepare(args.out)
     except ValueError as error:
         print(f"evaluate.py: error: {error}", file=sys.stderr)
         return 2
-    controllers = CONTROLLERS if args.controller == "all" else (args.controller,)
     observers = tuple(ARMS) if args.observer == "all" else (args.observer,)
     arms = [arm for observer in observers for arm in ARMS[observer][args.compensation]]
     groups = study.groups(scenarios, controllers, arms, args.runs)
     runs = sum(group.runs for group in groups)
-    print(f"{runs} runs to do", file=sys.stderr, flush=True)
     try:
+        print(f"{runs} runs to do", file=sys.stderr, flush=True)
         with tqdm(
             total=study.simulated_seconds(groups),
             unit="s",

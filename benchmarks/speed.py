@@ -41,7 +41,7 @@ def kernels() -> None:
         x = np.random.default_rng(0).uniform(-1.0, 1.0, (4, n))
         params = np.repeat(CartPendulum().as_array()[:, None], n, axis=1)
         u, samples, y = np.full(n, 3.0), np.empty((steps, 2, n)), x[:2].copy()
-        estimator = SlidingModeObserver().start(n, 0.001, 30.0)
+        estimator = SlidingModeObserver().start(n, 0.001, 30.0, CartPendulum())
         start = x.copy()
 
         def plant(x=x, start=start, params=params, u=u, samples=samples) -> None:

@@ -1,9 +1,10 @@
 """Sliding mode estimation and control of an uncertain cart pendulum, seen only through its position encoders.
 
-Importing registers two environments, each scalar and natively vectorised:
+Importing registers three environments, each scalar and natively vectorised:
 
 - ``SMOPendulum-v0``: the article's plant (g = -9.8 m/s^2: theta = 0 hangs).
 - ``SMOPendulumUpright-v0``: g = +9.8 m/s^2, theta = 0 is upright.
+- ``SMOPendulumTracking-v0``: the article's plant and a minimum-energy reference to follow.
 """
 
 import gymnasium
@@ -12,6 +13,7 @@ from .controllers import LQR, SlidingModeController
 from .kernels.batch import set_threads
 from .observers import Gains, Oracle, SlidingModeObserver
 from .plant import CartPendulum
+from .reference import Reference
 from .wrappers import ObserverWrapper, VectorObserverWrapper
 
 __version__ = "0.1.0"
@@ -22,13 +24,16 @@ __all__ = [
     "Gains",
     "ObserverWrapper",
     "Oracle",
+    "Reference",
     "SlidingModeController",
     "SlidingModeObserver",
     "VectorObserverWrapper",
     "set_threads",
 ]
 
-for _id, _name in (("SMOPendulum-v0", "Pendulum"), ("SMOPendulumUpright-v0", "Upright")):
+_IDS = {"SMOPendulum-v0": "Pendulum", "SMOPendulumUpright-v0": "Upright", "SMOPendulumTracking-v0": "Tracking"}
+
+for _id, _name in _IDS.items():
     if _id not in gymnasium.registry:
         gymnasium.register(
             _id,

@@ -13,12 +13,11 @@ from .kernels.batch import LANES, for_slots, load, store
 from .kernels.cart_pendulum import drift_and_gain, energy
 from .kernels.cart_pendulum import plant as _plant
 from .kernels.rk4 import rk4
-from .validation import array, number, unknown
+from .validation import array, mapping, number
 
 Array = NDArray[np.float64]
 STATE_NAMES = ("h", "theta", "h_dot", "theta_dot")
-MICROSECONDS_A_STEP = 0.015
-"""Time of one Runge-Kutta step of one slot, to decide when a second thread is worth waking."""
+_MICROSECONDS_A_STEP = 0.015  # of one slot: decides when a second thread is worth waking
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +25,8 @@ class CartPendulum:
     """Parameters of the cart pendulum, by default the article's Table 2.
 
     The state is x = [h, theta, h', theta'] in m, rad, m/s, rad/s and the input u = F in N. theta is measured from the
-    upward vertical for ``gravity > 0``. The article prints g = -9.8 m/s^2 (Table 2), which turns the picture over:
-    theta = 0 is then the *hanging*, stable equilibrium.
+    upward vertical for ``gravity > 0``. The article prints g = -9.8 m/s^2 (Table 2), so there
+    theta = 0 is the *hanging*, stable equilibrium.
 
     Args:
         cart_mass: M_c in kg.
@@ -66,11 +65,7 @@ class CartPendulum:
         if isinstance(params, CartPendulum):
             return params
         if isinstance(params, Mapping):
-            known = [field.name for field in fields(cls)]
-            for name in params:
-                if name not in known:
-                    raise ValueError(unknown("plant parameter", name, known))
-            return replace(base, **params)
+            return replace(base, **mapping("plant parameter", params, [f.name for f in fields(cls)]))
         return cls(*array("params", params, (4,)).tolist())
 
     def as_array(self) -> Array:
@@ -87,7 +82,17 @@ class CartPendulum:
         return CartPendulum(M_c, m, l, self.gravity)
 
     def draw(self, uncertainty: float, rng: np.random.Generator) -> CartPendulum:
-        """One uncertain plant: M_c, m and l each times U(1 - x, 1 + x) (section 6, x = ``uncertainty`` in [0, 1))."""
+        """One uncertain plant: M_c, m and l each times U(1 - x, 1 + x) (section 6).
+
+        Args:
+            uncertainty: x in [0, 1).
+            rng: where the three numbers come from.
+
+        Raises:
+            ValueError: the uncertainty is not in [0, 1).
+        """
+        if not 0.0 <= number("uncertainty", uncertainty) < 1.0:
+            raise ValueError(f"uncertainty={uncertainty!r} must be a fraction in [0, 1)")
         return self.perturbed(uncertainty * rng.uniform(-1.0, 1.0, 3))
 
     def energy(self, x: ArrayLike) -> Array:
@@ -108,6 +113,8 @@ class CartPendulum:
 
     def _split(self, x: ArrayLike) -> tuple[Array, Array]:
         states = np.asarray(x, dtype=np.float64)
+        if states.shape[:1] != (4,) or states.ndim > 2:
+            raise ValueError(f"x has shape {states.shape}, it must have shape (4,) or (4, n)")
         batch = np.ascontiguousarray(states.reshape(4, -1))
         f, g = np.empty_like(batch), np.empty_like(batch)
         _drift_and_gain(batch, self.as_array(), f, g)
@@ -141,7 +148,7 @@ def advance(x: Array, params: Array, u: Array, dt: float, samples: Array) -> Non
         dt: step in s.
         samples: (steps, 2, n), filled with the positions [h, theta] after each step.
     """
-    for_slots(_advance, x.shape[1], MICROSECONDS_A_STEP * len(samples), x, params, u, dt, samples)
+    for_slots(_advance, x.shape[1], _MICROSECONDS_A_STEP * len(samples), x, params, u, dt, samples)
 
 
 @kernel

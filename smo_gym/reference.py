@@ -7,7 +7,8 @@ with CasADi and IPOPT (the extra ``reference``). A solution is its force; the st
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
 from importlib import resources
 from typing import Any
 
@@ -17,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from .kernels import plain
 from .kernels.cart_pendulum import control_affine, energy
 from .plant import CartPendulum, advance
-from .validation import array, multiple, number
+from .validation import array, multiple, number, unknown
 
 Array = NDArray[np.float64]
 _DEGREE = 4  # Radau points in an element
@@ -35,9 +36,10 @@ class Reference:
         x0: start, shape (4,).
         xT: end, shape (4,).
         horizon: T in s.
-        force_limit: bound of \\|F\\| in N.
+        force_limit: bound of the force in N.
         cost: J of equation (53) in J s.
         u: force in N in each of equally long elements.
+        params: [M_c, m, l, g] of the plant that follows it, shape (4,).
     """
 
     x0: tuple[float, ...]
@@ -46,15 +48,16 @@ class Reference:
     force_limit: float
     cost: float
     u: tuple[float, ...]
+    params: tuple[float, ...]
 
-    def trajectory(self, dt: float, model: CartPendulum | None = None) -> Array:
-        """States x_d (4, N + 1) at 0, dt, ..., T: the model integrated with Runge-Kutta steps of ``dt`` under the force.
+    def trajectory(self, dt: float) -> Array:
+        """States x_d (4, N + 1) at 0, dt, ..., T: the plant integrated with Runge-Kutta steps of ``dt``.
 
         Raises:
             ValueError: an element is no whole number of steps.
         """
         steps = multiple("element", self.horizon / len(self.u), "dt", dt)
-        params = (model or CartPendulum()).as_array()[:, None]
+        params = np.array(self.params)[:, None]
         x = np.array(self.x0)[:, None]
         states, sample = [x[:, 0].copy()], np.empty((1, 2, 1))
         for u in np.repeat(self.u, steps):
@@ -69,8 +72,32 @@ class Reference:
     @classmethod
     def from_json(cls, text: str) -> Reference:
         """The reference that :meth:`to_json` wrote."""
-        data = json.loads(text)
-        return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in data.items()})
+        return cls.of(json.loads(text))
+
+    @classmethod
+    def of(cls, reference: Reference | Mapping[str, Any]) -> Reference:
+        """A reference from a reference or a mapping of its fields.
+
+        Raises:
+            ValueError: a field is unknown, missing or of a wrong shape.
+        """
+        if isinstance(reference, Reference):
+            return reference
+        known = [f.name for f in fields(cls)]
+        for name in reference:
+            if name not in known:
+                raise ValueError(unknown("field of a reference", name, known))
+        if missing := [name for name in known if name not in reference]:
+            raise ValueError(f"reference lacks {', '.join(missing)}")
+        return cls(
+            x0=tuple(array("reference x0", reference["x0"], (4,)).tolist()),
+            xT=tuple(array("reference xT", reference["xT"], (4,)).tolist()),
+            horizon=number("reference horizon", reference["horizon"], above=0.0),
+            force_limit=number("reference force_limit", reference["force_limit"], above=0.0),
+            cost=number("reference cost", reference["cost"]),
+            u=tuple(array("reference u", reference["u"], (len(reference["u"]),)).tolist()),
+            params=tuple(array("reference params", reference["params"], (4,)).tolist()),
+        )
 
 
 def shipped() -> Reference:
@@ -112,7 +139,9 @@ def minimum_energy(
         import casadi
     except ImportError:
         raise ImportError('minimum_energy needs CasADi: pip install "smo_gym[reference]"') from None
-    parameters = (model or CartPendulum()).as_array().tolist()
+    parameters: list[float] = (model or CartPendulum()).as_array().tolist()
+
+    mechanical_energy: Any = plain(energy)  # of symbols here
 
     def rates(x: Any, u: Any) -> Any:
         f_h, f_theta, g_h, g_theta = plain(control_affine)(casadi.sin(x[1]), casadi.cos(x[1]), x[3], *parameters)
@@ -131,13 +160,13 @@ def minimum_energy(
         for j in range(_DEGREE):
             state = inside[:, j + 1]
             problem.subject_to(slopes[:, j] == h * rates(state, u[k]))
-            cost += h * B[j] * plain(energy)(casadi.cos(state[1]), state[2], state[3], *parameters)
+            cost += h * B[j] * mechanical_energy(casadi.cos(state[1]), state[2], state[3], *parameters)
     problem.minimize(cost)
     problem.subject_to(x[:, 0] == start)
     problem.subject_to(x[:, -1] == end)
     problem.subject_to(problem.bounded(-bound, u, bound))
     problem.set_initial(x, start[:, None] + np.linspace(0.0, 1.0, elements * _DEGREE + 1) * (end - start)[:, None])
-    quiet = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 1000}}
+    quiet: Any = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 1000}}
     problem.solver("ipopt", quiet)
     try:
         solution = problem.solve()
@@ -148,4 +177,12 @@ def minimum_energy(
             f"IPOPT says {reason!r}"
         ) from None
     forces = np.atleast_1d(solution.value(u))
-    return Reference(tuple(start.tolist()), tuple(end.tolist()), T, bound, float(solution.value(cost)), tuple(forces.tolist()))
+    return Reference(
+        x0=tuple(start.tolist()),
+        xT=tuple(end.tolist()),
+        horizon=T,
+        force_limit=bound,
+        cost=float(solution.value(cost)),
+        u=tuple(forces.tolist()),
+        params=tuple(parameters),
+    )

@@ -2,7 +2,8 @@
 
 import difflib
 import math
-from collections.abc import Iterable
+import numbers
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,8 @@ def number(name: str, value: Any, *, above: float = -math.inf, below: float = ma
     Raises:
         ValueError: it is not.
     """
-    try:
-        result = float(value)
-    except (TypeError, ValueError):
-        result = math.nan
+    plain = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
+    result = float(value) if plain else math.nan
     if not (math.isfinite(result) and above < result < below):
         bounds = [f"greater than {above:g}"] * math.isfinite(above) + [f"less than {below:g}"] * math.isfinite(below)
         raise ValueError(f"{name}={value!r} must be a finite number{' ' if bounds else ''}{' and '.join(bounds)}")
@@ -34,6 +33,19 @@ def limit(name: str, value: Any) -> float:
     if value is None or value == math.inf:
         return math.inf
     return number(name, value, above=0.0)
+
+
+def mapping(what: str, value: Any, known: Iterable[str]) -> dict[str, Any]:
+    """A mapping whose keys are all known ones.
+
+    Raises:
+        ValueError: it is not a mapping, or a key is unknown, with a suggestion.
+    """
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{what}: {value!r} must be a mapping with the keys {', '.join(map(repr, sorted(known)))}")
+    for name in value:
+        choice(what, name, known)
+    return dict(value)
 
 
 def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -68,12 +80,13 @@ def multiple(name: str, value: Any, of_name: str, of: float) -> int:
 def unknown(what: str, name: object, known: Iterable[str]) -> str:
     """The message for a name that nothing answers to, with the nearest name that exists."""
     known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, n=1, cutoff=0.5)
-    hint = f"did you mean {near[0]!r}? " if near else ""
+    lower = {word.lower(): word for word in known}
+    near = difflib.get_close_matches(str(name).lower(), lower, n=1, cutoff=0.5)
+    hint = f"did you mean {lower[near[0]]!r}? " if near else ""
     return f"unknown {what} {name!r}: {hint}known are {', '.join(map(repr, known))}"
 
 
-def choice(what: str, name: str, known: Iterable[str]) -> str:
+def choice(what: str, name: Any, known: Iterable[str]) -> str:
     """The name itself when it is one of the known ones.
 
     Raises:
@@ -82,4 +95,4 @@ def choice(what: str, name: str, known: Iterable[str]) -> str:
     known = list(known)
     if name not in known:
         raise ValueError(unknown(what, name, known))
-    return name
+    return str(name)

@@ -6,7 +6,7 @@ import pytest
 
 import smo_gym  # noqa: F401  registers the environments
 
-IDS = ("SMOPendulum-v0", "SMOPendulumUpright-v0")
+IDS = ("SMOPendulum-v0", "SMOPendulumUpright-v0", "SMOPendulumTracking-v0")
 
 
 @pytest.fixture(params=IDS)

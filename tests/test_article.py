@@ -1,8 +1,13 @@
 """The published data and the printed constants."""
 
+from pathlib import Path
+
 import numpy as np
 
 from smo_gym import CartPendulum, article
+from smo_gym.evaluation import scenario
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 
 
 def cells(**where):
@@ -49,6 +54,13 @@ def test_table_2_is_the_default_plant():
     assert CartPendulum().as_dict() == {"cart_mass": 3.5, "bob_mass": 0.32, "rod_length": 0.44, "gravity": -9.8}
 
 
-def test_the_levels_are_those_of_the_data():
-    assert {int(cell.uncertainty_percent) for cell in cells(table="4")} == set(article.UNCERTAINTIES_PERCENT)
-    assert {cell.case for cell in cells(table="5")} == set(article.INITIAL_STATES)
+def test_the_scenarios_have_the_printed_levels_cases_and_gains():
+    for name, table in (("regulation", "4"), ("initial-conditions", "5")):
+        one = scenario.load(CONFIGS / f"{name}.yaml")
+        assert {f"{100 * x:g}" for x in one.uncertainty.value} >= {
+            c.uncertainty_percent for c in cells(table=table)
+        } - {""}
+        assert set(one.initial_states.value) == {c.case for c in cells(table=table)}
+        smc = one.controllers["smc"]
+        assert {key: getattr(smc, key).value for key in ("Z0", "lam", "epsilon")} == article.SMC_GAINS
+        assert [settings.observer.gains.value for settings in one.controllers.values()] == ["lqr", "smc"]

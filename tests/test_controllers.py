@@ -13,10 +13,9 @@ Q, R = [52.33, 57.61, 61.30, 0.39], 1.0
 
 
 @pytest.mark.parametrize("model", [CartPendulum(), CartPendulum(gravity=9.8)])
-@pytest.mark.parametrize("theta", [0.0, math.pi])
-def test_lqr_gain_is_that_of_python_control(model, theta):
-    expected, *_ = control.lqr(*model.linearise(theta), np.diag(Q), np.array([[R]]))
-    np.testing.assert_allclose(LQR.design(Q, R, model, theta).K, expected, rtol=1e-8)
+def test_lqr_gain_is_that_of_python_control(model):
+    expected, *_ = control.lqr(*model.linearise(), np.diag(Q), np.array([[R]]))
+    np.testing.assert_allclose(LQR.design(Q, R, model).K, expected, rtol=1e-8)
 
 
 def test_lqr_takes_full_weights():
@@ -41,6 +40,18 @@ def test_lqr_may_have_a_gain_a_slot():
     observation = np.random.default_rng(1).normal(size=(5, 6))
     expected = -(observation[:, 2:] * K).sum(axis=1, keepdims=True)
     np.testing.assert_allclose(LQR(K).predict(observation)[0], expected)
+
+
+SMC = SlidingModeController((0.6, 1.5, 1.6, 0.4), 0.001, 3.0)
+
+
+@pytest.mark.parametrize("law", [LQR([1.0, -2.0, 3.0, -4.0]), SMC])
+def test_with_a_reference_the_laws_see_the_error(law):
+    rng = np.random.default_rng(0)
+    y, x_d, preview, xhat = (rng.normal(size=(7, n)) for n in (2, 4, 8, 4))
+    tracking, _ = law.predict(np.concatenate([y, x_d, preview, xhat], axis=1))
+    regulating, _ = law.predict(np.concatenate([y, xhat - x_d], axis=1))
+    assert (tracking == regulating).all()
 
 
 def smc_by_hand(estimates, k, dt, slope, Z0=26.0, lam=30.0, epsilon=0.1460):
@@ -95,7 +106,7 @@ def test_stable_baselines3_evaluates_a_law(law):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: LQR([1.0, 2.0]), r"K=.* must be finite and of shape \(4,\) or \(n, 4\)"),
+        (lambda: LQR([1.0, 2.0]), r"K has shape \(2,\), it must have shape \(4,\) or \(n, 4\)"),
         (lambda: LQR([1.0, 2.0, np.nan, 0.0]), "K=.* must be finite"),
         (lambda: LQR.design([1, 1, 1, -1], 1.0), "Q=.* must be symmetric positive semidefinite"),
         (lambda: LQR.design(np.triu(np.ones((4, 4))), 1.0), "(?s)Q=.* must be symmetric positive semidefinite"),
@@ -105,6 +116,13 @@ def test_stable_baselines3_evaluates_a_law(law):
         (lambda: SlidingModeController((1, 1, 1, 1), 0.0, 1.0), "dt=0.0 must be a finite number greater than 0"),
         (lambda: SlidingModeController((1, 1, 1, 1), 0.001, -1.0), "slope=-1.0 must be a finite number greater than 0"),
         (lambda: LQR([1, 1, 1, 1]).predict(np.zeros((3, 2))), "wrap the environment in smo_gym.ObserverWrapper"),
+        (lambda: LQR(np.ones((3, 4))).predict(np.zeros((5, 6))), r"K has 3 slots, the observation has shape \(5, 6\)"),
+        (lambda: LQR("abc"), "K has shape"),
+        (lambda: LQR.design("abc", 1.0), "Q='abc' must be an array of numbers"),
+        (
+            lambda: SMC.predict(np.zeros((5, 6)), (np.zeros(2),)),
+            r"state\[0\] has shape \(2,\), it must have shape \(5,\)",
+        ),
     ],
 )
 def test_bad_settings_are_named(make, message):

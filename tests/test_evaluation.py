@@ -60,7 +60,7 @@ def test_metrics_are_those_of_a_plain_loop(closed_loop):
 def test_small_motions_follow_the_linear_closed_loop(make_vec):
     x0 = np.array([1e-4, 1e-4, 0.0, 0.0])
     env = make_vec(1, autoreset_mode="Disabled", control_period=0.001, horizon=3.0, uncertainty=0.0)
-    env = VectorObserverWrapper(env, "oracle", xhat0=tuple(x0))
+    env = VectorObserverWrapper(env, "oracle")
     result = rollout(env, LQR(K), options={"state": x0}, trace_every=100)
     A, B = CartPendulum().linearise()
     exact = np.array([expm((A - B @ [K]) * t) @ x0 for t in result.traces.time])
@@ -212,20 +212,28 @@ def test_failed_runs_are_counted_and_kept_out_of_means(small):
     one = find(results, uncertainty_percent="10", metric="mse", state="h", compensation="without")
     assert (one.measured, one.failures, one.runs) == (pytest.approx(0.2), 1, 4)
     reduction = find(results, uncertainty_percent="10", metric="mse_reduction_percent", state="h")
-    assert reduction.failures == 2
+    assert (reduction.runs, reduction.failures) == (4, 2)
+    assert reduction.measured == pytest.approx(100 * (1 - (0.1 + 0.1) / (0.1 + 0.3)))  # over the pairs that are whole
     assert "2 of 8 runs failed" in tables.render(results, "simple", rms=False)
     nothing = statistics.results([outcome(small, 0.1, "with", [np.nan, np.nan], [True, True])])
     assert find(nothing, uncertainty_percent="10", metric="mse", state="h").failures == 2
 
 
-def test_intervals_hold_the_mean_as_often_as_they_say(small):
+def test_intervals_of_ten_runs_hold_the_mean_as_often_as_they_say(small):
     rng = np.random.default_rng(0)
     held = 0
-    for _ in range(200):
-        values = rng.normal(1.0, 0.1, 30)
-        (low, high) = statistics._interval((values,), statistics._mean)
-        held += low <= 1.0 <= high
-    assert 178 <= held <= 199
+    for _ in range(400):
+        without = rng.normal(1.0, 0.1, 10)
+        both = [
+            outcome(small, 0.1, "without", without),
+            outcome(small, 0.1, "with", without * rng.normal(0.4, 0.04, 10)),
+        ]
+        results = statistics.results(both)
+        mean = find(results, uncertainty_percent="10", metric="mse", state="h", compensation="without")
+        reduction = find(results, uncertainty_percent="10", metric="mse_reduction_percent", state="h")
+        held += np.array([mean.ci_low <= 1.0 <= mean.ci_high, reduction.ci_low <= 60.0 <= reduction.ci_high])
+    assert (held > 0.92 * 400).all()
+    assert (held < 0.98 * 400).all()
 
 
 @pytest.mark.parametrize(
@@ -235,9 +243,17 @@ def test_intervals_hold_the_mean_as_often_as_they_say(small):
         (("slopes:", "slope:"), r"slope: unknown setting 'slope': did you mean 'slopes'\?"),
         (("[0.1, 0.2]", "[0.1, 1.5]"), r"uncertainty\.value\.1: .* less than 1 \(given 1\.5\)"),
         (("source: printed", "source: guessed"), r"source: .*'printed', 'identified' or 'chosen' \(given 'guessed'\)"),
-        (("law: lqr", "law: pid"), "law|pid"),
+        (("law: lqr", "law: pid"), r"controllers\.lqr: Input tag 'pid' found using 'law' does not match"),
+        (("SMOPendulum-v0", "SMOPendulm-v0"), "Environment `SMOPendulm` doesn't exist"),
+        (("SMOPendulum-v0", "Pendulum-v1"), "Pendulum"),
+        (("{value: 1.0,", "{value: -1.0,"), r"horizon=-1\.0 must be a finite number greater than 0"),
+        (("gains: {value: lqr", "gains: {value: lqg"), r"unknown column of Table 3 'lqg': did you mean 'lqr'\?"),
+        (("[12.0, 12.0]", "[1500, 12.0]"), "too large for these gains"),
+        (('{"": [1.0, 1.0, 0.1, 0.01]}', "{}"), "initial_states.value: Dictionary should have at least 1 item"),
+        (('table: "4"', "extends: bad.yaml"), "extends itself"),
+        (('table: "4"', "extends: 5"), "extends=5 must be the name of a file"),
         (('table: "4"', ""), "table: Field required"),
-        (("title: test", "title: ["), "is no YAML"),
+        (("title: test", "title: ["), "is not YAML"),
     ],
 )
 def test_bad_scenarios_are_named(tmp_path, change, message):
@@ -246,6 +262,28 @@ def test_bad_scenarios_are_named(tmp_path, change, message):
     path.write_text(SCENARIO.replace(*change))
     with pytest.raises(ValueError, match=message):
         scenario.load(path)
+
+
+def test_a_scenario_of_the_upright_plant_is_upright(tmp_path):
+    path = tmp_path / "upright.yaml"
+    changes = (
+        ("SMOPendulum-v0", "SMOPendulumUpright-v0"),
+        ("[7.234, -4.132, 11.075, -1.025]", "[-3.16, -101.39, -7.16, -21.04]"),
+    )
+    text = SCENARIO.replace("[1.0, 1.0, 0.1, 0.01]", "[0.0, 0.1, 0.0, 0.0]")
+    for change in changes:
+        text = text.replace(*change)
+    path.write_text(text.replace("{value: 1.0,", "{value: 5.0,"))
+    groups = study.groups([scenario.load(path)], ["lqr"], ["with", "oracle"], 2)
+    for outcome in study.measure(groups, seed=0):
+        assert not outcome.failed.any()
+        assert outcome.metrics["peak_theta"].max() < 0.5
+        assert outcome.metrics["mse_theta"].max() < 0.1**2
+    hanging_gain = scenario.load(path).model_copy(update={"environment": "SMOPendulum-v0"})
+    assert all(
+        o.metrics["mse_h"].max() > 1.0
+        for o in study.measure(study.groups([hanging_gain], ["lqr"], ["oracle"], 1), seed=0)
+    )
 
 
 def test_a_missing_scenario_is_named(tmp_path):

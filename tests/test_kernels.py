@@ -54,7 +54,7 @@ def _batch(n, steps=5):
     x = np.array([rng.uniform(-1.0, 1.0, 4) for rng in draws]).T.copy()
     params = np.array([CartPendulum().draw(0.2, rng).as_array() for rng in draws]).T.copy()
     u = np.array([rng.uniform(-30.0, 30.0) for rng in draws])
-    estimator = SlidingModeObserver().start(n, 0.001, 30.0)
+    estimator = SlidingModeObserver().start(n, 0.001, 30.0, CartPendulum())
     samples = np.empty((steps, 2, n))
     y = x[:2].copy()
     advance(x, params, u, 0.001, samples)

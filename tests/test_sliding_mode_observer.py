@@ -50,7 +50,7 @@ SAMPLES = np.array([[0.31, -0.82], [0.312, -0.817], [0.315, -0.812], [0.319, -0.
 
 def update(observer, u, samples=SAMPLES, xhat0=None):
     """xhat after a period of as many samples as follow the first."""
-    estimator = (replace(observer, xhat0=xhat0) if xhat0 is not None else observer).start(1, DT, 30.0)
+    estimator = (replace(observer, xhat0=xhat0) if xhat0 is not None else observer).start(1, DT, 30.0, CartPendulum())
     estimator.update(Period(samples[0][:, None], samples[1:, :, None].copy(), np.array([u]), np.zeros((4, 1))))
     return estimator.xhat[:, 0]
 
@@ -102,7 +102,7 @@ def test_compensation_is_the_part_of_the_gain_in_the_force():
 
 def test_each_slot_may_have_its_own_settings():
     observers = [SlidingModeObserver(compensation=c, slopes=(s, s)) for c in (True, False) for s in (10.0, 14.0)]
-    bank = SlidingModeObserver.start_each(observers, DT, 30.0)
+    bank = SlidingModeObserver.start_each(observers, DT, 30.0, CartPendulum())
     y = np.repeat(SAMPLES[0][:, None], 4, axis=1)
     bank.update(Period(y, np.repeat(SAMPLES[1:, :, None], 4, axis=2), np.full(4, 5.0), np.zeros((4, 4))))
     for i, observer in enumerate(observers):
@@ -192,10 +192,10 @@ def test_all_errors_are_small_after_the_time_of_equation_48_with_exact_sgn():
 def test_a_step_too_large_is_refused_with_the_largest_that_works():
     steep = SlidingModeObserver(gains=Gains((6.0, 6.0), (30.0, 30.0), (0.5, 0.5)), slopes=(100.0, 100.0))
     with pytest.raises(ValueError, match=r"step=0\.001 s is too large .* step=0\.0005$"):
-        steep.start(1, DT, 30.0)
-    replace(steep, step=0.0005).start(1, DT, 30.0)
+        steep.start(1, DT, 30.0, CartPendulum())
+    replace(steep, step=0.0005).start(1, DT, 30.0, CartPendulum())
     with pytest.raises(ValueError, match=r"RK4 is stable up to 0\.0006189 s"):
-        replace(steep, step=DT / 1).start(1, DT, 30.0)
+        replace(steep, step=DT / 1).start(1, DT, 30.0, CartPendulum())
 
 
 def test_the_limit_of_the_step_is_where_the_error_starts_to_grow():
@@ -234,9 +234,11 @@ def test_bad_settings_are_named(settings, message):
 
 def test_the_step_divides_the_sampling_period():
     with pytest.raises(ValueError, match="must be a whole multiple of step=0.0003"):
-        SlidingModeObserver(step=0.0003).start(1, DT, 30.0)
+        SlidingModeObserver(step=0.0003).start(1, DT, 30.0, CartPendulum())
 
 
 def test_slots_of_one_batch_share_step_and_model():
     with pytest.raises(ValueError, match="same step and model"):
-        SlidingModeObserver.start_each([SlidingModeObserver(), SlidingModeObserver(step=0.0005)], DT, 30.0)
+        SlidingModeObserver.start_each(
+            [SlidingModeObserver(), SlidingModeObserver(step=0.0005)], DT, 30.0, CartPendulum()
+        )

@@ -4,20 +4,21 @@ import gymnasium
 import numpy as np
 import pytest
 
-from smo_gym import ObserverWrapper, Oracle, SlidingModeObserver, VectorObserverWrapper
+from smo_gym import CartPendulum, ObserverWrapper, Oracle, SlidingModeObserver, VectorObserverWrapper
 
 
 def test_the_observation_is_measurement_then_estimate(env_id):
     env = ObserverWrapper(gymnasium.make(env_id))
-    assert env.observation_space.shape == (6,)
+    inner = gymnasium.make(env_id).observation_space.shape[0]
+    assert env.observation_space.shape == (inner + 4,)
     observation, info = env.reset(seed=0)
     assert observation.dtype == np.float64
     assert (observation[:2] == info["state"][:2]).all()
-    assert (observation[2:] == 0.0).all()  # nothing is known before the first period
+    assert (observation[-4:] == 0.0).all()  # nothing is known before the first period
     for _ in range(3):
         observation, *_, info = env.step(np.array([5.0]))
     assert (observation[:2] == info["state"][:2]).all()
-    assert (observation[2:] != 0.0).all()
+    assert (observation[-4:] != 0.0).all()
 
 
 def test_the_estimate_converges_to_the_true_state():
@@ -49,10 +50,10 @@ def test_it_works_inside_rescale_action():
 
 def test_the_oracle_is_the_true_state(env_id):
     env = ObserverWrapper(gymnasium.make(env_id), "oracle")
-    observation, _ = env.reset(seed=0)
-    assert (observation[2:] == 0.0).all()
-    observation, *_, info = env.step(np.ones(1))
-    assert (observation[2:] == info["state"]).all()
+    observation, info = env.reset(seed=0)
+    for _ in range(3):
+        assert (observation[-4:] == info["state"]).all()
+        observation, *_, info = env.step(np.ones(1))
 
 
 def test_the_oracle_of_a_batch_gives_the_last_state_of_an_episode(make_vec):
@@ -62,13 +63,23 @@ def test_the_oracle_of_a_batch_gives_the_last_state_of_an_episode(make_vec):
     observation, *_, info = env.step(np.ones((2, 1)))
     for i in (0, 1):
         assert (info["final_obs"][i][2:] == info["final_info"]["state"][i]).all()
-    assert (observation[:, 2:] == 0.0).all()
+    assert (observation[:, 2:] == info["state"]).all()
     assert (observation[:, :2] == info["state"][:, :2]).all()
 
 
 def test_the_model_is_the_environments_nominal_plant(env_id):
-    env = ObserverWrapper(gymnasium.make(env_id, params={"bob_mass": 0.5}))
-    assert env.observer.model == env.unwrapped.task.params
+    def estimate(observer, **params):
+        env = gymnasium.make(env_id, params=params)
+        env = ObserverWrapper(env, observer)
+        env.reset(
+            options={"state": [0.1, 0.1, 0.0, 0.0], "params": CartPendulum(gravity=env.unwrapped.task.params.gravity)}
+        )
+        return env.step(np.array([20.0]))[0][-4:]
+
+    nominal = gymnasium.make(env_id, params={"bob_mass": 0.5}).unwrapped.task.params
+    for observer in ("smo", SlidingModeObserver()):
+        assert (estimate(observer, bob_mass=0.5) == estimate(SlidingModeObserver(model=nominal))).all()
+        assert (estimate(observer, bob_mass=0.5) != estimate(observer)).any()
 
 
 def test_a_limited_force_bounds_the_step():
@@ -86,9 +97,37 @@ def test_refusals(make_vec):
         ObserverWrapper(env, "sm")
     with pytest.raises(ValueError, match=r"unknown setting of the observer 'smo' 'slope': did you mean 'slopes'\?"):
         ObserverWrapper(env, slope=(1.0, 1.0))
-    with pytest.raises(ValueError, match="has its own"):
+    with pytest.raises(ValueError, match="gains must not be given beside"):
         ObserverWrapper(env, Oracle(), gains="smc")
-    with pytest.raises(ValueError, match="observer has 1 entries for 2 slots"):
-        VectorObserverWrapper(make_vec(2), [SlidingModeObserver()])
-    with pytest.raises(TypeError, match="is no smo_gym environment"):
-        ObserverWrapper(gymnasium.make("Pendulum-v1"))
+    with pytest.raises(ValueError, match="compensation must not be given beside"):
+        ObserverWrapper(env, SlidingModeObserver(), compensation=False)
+    with pytest.raises(ValueError, match="observers of a sequence have their own settings"):
+        VectorObserverWrapper(make_vec(2), [SlidingModeObserver()] * 2, gains="smc")
+    for observers in ([SlidingModeObserver()], [Oracle()] * 2):
+        with pytest.raises(ValueError, match="it must have 2 SlidingModeObserver, one a slot"):
+            VectorObserverWrapper(make_vec(2), observers)
+    for env_of_others in (
+        gymnasium.make("Pendulum-v1"),
+        gymnasium.vector.SyncVectorEnv([lambda: gymnasium.make("Pendulum-v1")]),
+    ):
+        wrapper = ObserverWrapper if isinstance(env_of_others, gymnasium.Env) else VectorObserverWrapper
+        with pytest.raises(TypeError, match="is not a smo_gym environment"):
+            wrapper(env_of_others)
+    with pytest.raises(TypeError, match="observer=None must be one of 'smo', 'oracle' or an Observer"):
+        ObserverWrapper(env, None)
+    with pytest.raises(ValueError, match="must stand inside whatever else changes that"):
+        ObserverWrapper(ObserverWrapper(env))
+    different = [lambda m=m: gymnasium.make("SMOPendulum-v0", params={"bob_mass": m}) for m in (0.1, 0.5)]
+    with pytest.raises(ValueError, match="environments with different options"):
+        VectorObserverWrapper(gymnasium.vector.SyncVectorEnv(different))
+
+
+def test_the_measurement_comes_from_the_encoders_whatever_stands_between():
+    env = gymnasium.make("SMOPendulum-v0")
+    scaled = gymnasium.wrappers.TransformObservation(env, lambda y: 10.0 * y, env.observation_space)
+    estimates = []
+    for inner in (env, scaled):
+        wrapped = ObserverWrapper(inner)
+        wrapped.reset(seed=0)
+        estimates.append([wrapped.step(np.ones(1))[0][2:] for _ in range(3)])
+    assert np.array_equal(*estimates)

@@ -19,17 +19,6 @@ OBSERVER_GAINS = {
 SMC_GAINS = {"Z0": 26.0, "lam": 30.0, "epsilon": 0.1460}
 """Table 6 (printed for tracking; the article does not say whether regulation used them)."""
 
-UNCERTAINTIES_PERCENT = (5, 7, 10, 15, 18, 20)
-"""The levels of Tables 4 and 7."""
-
-INITIAL_STATES = {
-    "1": (1.0, 1.0, 0.1, 0.01),
-    "2": (0.15, -1.0, 0.1, 0.01),
-    "3": (-1.0, -1.0, 0.1, 0.01),
-    "4": (-0.2, 1.0, 0.1, 0.01),
-}
-"""x(0) of Table 5's cases."""
-
 
 @dataclass(frozen=True, slots=True)
 class Cell:

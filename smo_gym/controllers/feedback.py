@@ -3,23 +3,27 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..validation import number
+from ..validation import array, number
 
 Array = NDArray[np.float64]
 
 
-def estimates(observation: Array) -> Array:
-    """xhat, the last four entries of observations (..., 6) from an observer wrapper.
+def estimated_error(observation: Array) -> Array:
+    """What a law should bring to zero, (..., 4): xhat, or xhat - x_d where the observation tells x_d.
+
+    The observation is [h, theta, xhat (4)], or with a reference [h, theta, x_d (4), preview (4 each), xhat (4)].
 
     Raises:
         ValueError: the observation has another size: it comes from an environment without an observer.
     """
-    if observation.shape[-1] != 6:
+    size = observation.shape[-1]
+    if size < 6 or (size - 2) % 4:
         raise ValueError(
-            f"observation has shape {observation.shape}, its last axis must be [h, theta, xhat (4)]: "
+            f"observation has shape {observation.shape}, it must begin with [h, theta] and end with xhat (4): "
             "wrap the environment in smo_gym.ObserverWrapper or smo_gym.VectorObserverWrapper"
         )
-    return observation[..., 2:]
+    xhat = observation[..., -4:]
+    return xhat if size == 6 else xhat - observation[..., 2:6]
 
 
 def weights(Q: ArrayLike, R: float) -> tuple[Array, float]:
@@ -28,11 +32,10 @@ def weights(Q: ArrayLike, R: float) -> tuple[Array, float]:
     Raises:
         ValueError: Q is not symmetric positive semidefinite of shape (4,) or (4, 4), or R is not positive.
     """
-    matrix = np.array(Q, dtype=np.float64)
+    matrix = array("Q", Q, np.shape(Q))
     matrix = np.diag(matrix) if matrix.shape == (4,) else matrix
     if (
         matrix.shape != (4, 4)
-        or not np.isfinite(matrix).all()
         or not np.allclose(matrix, matrix.T)
         or np.linalg.eigvalsh(matrix).min() < -1e-12 * max(1.0, np.abs(matrix).max())
     ):

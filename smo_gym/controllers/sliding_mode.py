@@ -9,7 +9,7 @@ from ..article import SMC_GAINS
 from ..kernels import kernel
 from ..kernels.elementary import sincos, tanh
 from ..validation import array, number
-from .feedback import estimates
+from .feedback import estimated_error
 
 Array = NDArray[np.float64]
 
@@ -21,6 +21,8 @@ class SlidingModeController:
 
         s = (k1 h + k3 h')^2 / 2 + (k2 theta + k4 theta')^2 / 2                  (50)
         u = Z0 S(sin(pi / epsilon (s + lam integral of tanh(s))))                (49)
+
+    on the estimate xhat, or on xhat - x_d where there is a reference to track (section 6.2).
 
     S is tanh with a slope (Remark 7). The integral is the law's state: it grows by ``dt tanh(s_k)`` after u_k is taken.
 
@@ -61,29 +63,29 @@ class SlidingModeController:
         observation: Array,
         state: tuple[Array, ...] | None = None,
         episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = True,
+        deterministic: bool = False,
     ) -> tuple[Array, tuple[Array, ...] | None]:
         """The force in N and the integral after it.
 
         Args:
-            observation: (n, 6) or (6,), from an observer wrapper.
+            observation: (n, observation) or (observation,), from an observer wrapper.
             state: ``(integral,)`` with the integral of tanh(s), shape (n,); None at the start.
             episode_start: slots whose integral starts at 0, shape (n,).
-            deterministic: the law knows no other way.
+            deterministic: without effect: the law draws nothing.
 
         Returns:
             The force (n, 1), or (1,) for one observation, and the state for the next call.
 
         Raises:
-            ValueError: the observation does not end in the four entries of xhat.
+            ValueError: the observation does not come from an observer wrapper.
         """
-        xhat = np.atleast_2d(estimates(observation))
-        n = len(xhat)
-        integral = np.zeros(n) if state is None else state[0].copy()
+        e = np.atleast_2d(estimated_error(observation))
+        n = len(e)
+        integral = np.zeros(n) if state is None else array("state[0]", state[0], (n,))
         if episode_start is not None:
-            integral[np.atleast_1d(episode_start)] = 0.0
+            integral[np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), n)] = 0.0
         u = np.empty((n, 1))
-        _switch(xhat, integral, self._settings, u)
+        _switch(e, integral, self._settings, u)
         return (u if observation.ndim == 2 else u[0]), (integral,)
 
     def __repr__(self) -> str:
@@ -92,13 +94,13 @@ class SlidingModeController:
 
 
 @kernel
-def _switch(xhat: Array, integral: Array, settings: Array, u: Array) -> None:
-    k1, k2, k3, k4, Z0, lam, per_epsilon, slope, dt = settings
-    for i in range(len(integral)):
-        h, theta, v, omega = xhat[i, 0], xhat[i, 1], xhat[i, 2], xhat[i, 3]
+def _switch(e: Array, integral: Array, settings: Array, u: Array) -> None:
+    k1, k2, k3, k4, Z0, lam, pi_over_epsilon, slope, dt = settings
+    for i in range(len(u)):
+        h, theta, v, omega = e[i, 0], e[i, 1], e[i, 2], e[i, 3]
         cart = k1 * h + k3 * v
         rod = k2 * theta + k4 * omega
         s = 0.5 * cart * cart + 0.5 * rod * rod
-        sin, _ = sincos(per_epsilon * (s + lam * integral[i]))
+        sin, _ = sincos(pi_over_epsilon * (s + lam * integral[i]))
         u[i, 0] = Z0 * tanh(slope * sin)
         integral[i] += dt * tanh(s)

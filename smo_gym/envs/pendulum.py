@@ -10,7 +10,8 @@ from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from ..validation import unknown
-from .task import HANGING, UPRIGHT, Stepper, Task, applied_force
+from .desired import Desired
+from .task import HANGING, TRACKING, UPRIGHT, Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
 RESET_OPTIONS = ("state", "params")
@@ -39,7 +40,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
 
     ## Observation Space
 
-    `Box(-inf, inf, (2,), float64)`: the encoders. theta is not wrapped, as an encoder counts on.
+    `Box(-inf, inf, (2,), float64)`: the encoders. theta is not wrapped, as an encoder goes on counting.
 
     | Num | Observation | Min | Max | Unit |
     |-----|-------------|-----|-----|------|
@@ -66,7 +67,8 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
     ## Information
 
     At every step, with the same keys: `state` (4,) and `params` [M_c, m, l, g] (4,), the truth; `force`, what the
-    actuator applied; `samples` (substeps, 2), the encoders at each sampling instant of the control period just run.
+    actuator applied; `samples` (substeps, 2), the encoders at each sampling instant of the control period just run;
+    `desired` (substeps, 2), where h and theta should have been then.
 
     ## Arguments
 
@@ -82,6 +84,8 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
     | `angle_limit` | None | rad; None for no limit |
     | `horizon` | 35 | s |
     | `reward` | see above | weights: a mapping with `q`, `r`, `failure` |
+    | `reference` | None | a trajectory to follow, :class:`smo_gym.Reference`; None asks for rest at zero |
+    | `preview` | 5 | number of future control instants whose x_d a tracking observation tells |
     | `render_mode` | None | no mode yet |
 
     `reset(options={"state": ..., "params": ...})` replays one exact case; what is not given is drawn.
@@ -102,6 +106,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         self.observation_space = self.task.observation_space
         self.action_space = self.task.action_space
         self._stepper = Stepper(self.task)
+        self._desired = Desired(self.task)
         self._steps_left = 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -115,28 +120,35 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         self._x, self._params = x[:, None], params[:, None]
         self._steps_left = self.task.steps
         samples = np.repeat(x[None, :2], self._stepper.substeps, axis=0)
-        return x[:2].copy(), self._info(samples, 0.0)
+        return self._observation(0), self._info(samples, 0.0, 0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Hold the force over one control period."""
         if self._steps_left == 0:
             raise ResetNeeded("the episode has not begun or is over: call reset() before step()")
-        u = applied_force(np.asarray(action)[None], 1, self.task.force_limit)
-        samples, reward, failed = self._stepper.step(self._x, self._params, u)
-        terminated = bool(failed[0])
+        if np.shape(action) != (1,):
+            raise ValueError(f"action={action!r} has shape {np.shape(action)}, it must have shape (1,)")
+        u = applied_force([action], 1, self.task.force_limit)
         self._steps_left -= 1
+        k = self.task.steps - self._steps_left
+        samples, reward, failed = self._stepper.step(self._x, self._params, u, self._desired.states[k : k + 1])
+        terminated = bool(failed[0])
         truncated = self._steps_left == 0 and not terminated
         if terminated:
             self._steps_left = 0
-        info = self._info(samples[:, :, 0], float(u[0]))
-        return self._x[:2, 0].copy(), float(reward[0]), terminated, truncated, info
+        info = self._info(samples[:, :, 0], float(u[0]), k)
+        return self._observation(k), float(reward[0]), terminated, truncated, info
 
-    def _info(self, samples: Array, force: float) -> dict[str, Any]:
+    def _observation(self, k: int) -> Array:
+        return np.concatenate([self._x[:2, 0], self._desired.told[k]])
+
+    def _info(self, samples: Array, force: float, k: int) -> dict[str, Any]:
         return {
             "state": self._x[:, 0].copy(),
             "params": self._params[:, 0].copy(),
             "force": force,
             "samples": samples,
+            "desired": self._desired.positions[k].copy(),
         }
 
 
@@ -147,3 +159,13 @@ class UprightEnv(PendulumEnv):
     """
 
     defaults = UPRIGHT
+
+
+class TrackingEnv(PendulumEnv):
+    """``SMOPendulumTracking-v0``: :class:`PendulumEnv` that should follow the minimum-energy reference of Table 7.
+
+    The observation is [h, theta], then x_d (4) now, then x_d at each of the next ``preview`` control instants. The
+    reward weighs x - x_d. An episode begins on the reference and ends with it; ``horizon`` may be longer (then rest).
+    """
+
+    defaults = TRACKING

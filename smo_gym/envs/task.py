@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import kernel
 from ..plant import CartPendulum, advance
-from ..validation import array, limit, multiple, number, unknown
+from ..reference import Reference, shipped
+from ..validation import array, limit, mapping, multiple, number, unknown
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -23,9 +24,9 @@ Flags = NDArray[np.bool_]
 class Reward:
     """Weights of the quadratic reward (all chosen).
 
-    ``r = -control_period (q . x^2 + r u^2) - failure [terminated]`` with x at the end of the control period: minus the
-    cost an LQR with Q = diag(q) and R = r minimises, and a penalty for leaving the track or falling, large enough
-    that failing early never pays.
+    ``r = -control_period (q . e^2 + r u^2) - failure [terminated]`` with e = x - x_d at the end of the control period
+    (x_d = 0 without a reference): minus the cost an LQR with Q = diag(q) and R = r minimises, and a penalty for
+    leaving the track or falling.
 
     Args:
         q: weights of h^2, theta^2, h'^2, theta'^2 in 1/s per unit squared, shape (4,).
@@ -52,11 +53,7 @@ class Reward:
         """Weights from weights, a mapping of field names or None (the defaults)."""
         if isinstance(reward, Reward):
             return reward
-        known = [f.name for f in fields(cls)]
-        for name in reward or {}:
-            if name not in known:
-                raise ValueError(unknown("reward weight", name, known))
-        return cls(**(reward or {}))
+        return cls(**mapping("reward weight", reward or {}, [f.name for f in fields(cls)]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,6 +70,8 @@ class Task:
     angle_limit: float = math.inf
     horizon: float = 35.0
     reward: Reward = field(default_factory=Reward)
+    reference: Reference | None = None
+    preview: int = 5
 
     @classmethod
     def of(cls, options: Mapping[str, Any], base: Task) -> Task:
@@ -85,24 +84,35 @@ class Task:
         for name in options:
             if name not in known:
                 raise ValueError(unknown("environment option", name, [*known, "render_mode"]))
-        return replace(base, **{**options, "params": CartPendulum.of(options.get("params"), base.params)})
+        changes = {**options, "params": CartPendulum.of(options.get("params"), base.params)}
+        if options.get("reference") is not None:  # it says where an episode begins and how long it is
+            changes["reference"] = reference = Reference.of(options["reference"])
+            changes = {"initial_state": reference.x0, "horizon": reference.horizon, **changes}
+        return replace(base, **changes)
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
-        set_(self, "dt", number("dt", self.dt, above=0.0))
+        for name in ("dt", "control_period", "horizon"):
+            set_(self, name, number(name, getattr(self, name), above=0.0))
         multiple("control_period", self.control_period, "the integration step dt", self.dt)
         multiple("horizon", self.horizon, "control_period", self.control_period)
         set_(self, "params", CartPendulum.of(self.params))
         set_(self, "reward", Reward.of(self.reward))
-        if not 0.0 <= number("uncertainty", self.uncertainty) < 1.0:
+        set_(self, "uncertainty", number("uncertainty", self.uncertainty))
+        if not 0.0 <= self.uncertainty < 1.0:
             raise ValueError(f"uncertainty={self.uncertainty!r} must be a fraction in [0, 1)")
+        if not isinstance(self.preview, int) or self.preview < 0:
+            raise ValueError(f"preview={self.preview!r} must be a whole number of at least 0")
         for name in ("force_limit", "track_limit", "angle_limit"):
             set_(self, name, limit(name, getattr(self, name)))
         low, high = self._box()
         set_(self, "initial_state", (tuple(low.tolist()), tuple(high.tolist())))
 
     def _box(self) -> tuple[Array, Array]:
-        shape = np.shape(self.initial_state)
+        try:
+            shape = np.shape(self.initial_state)
+        except ValueError:
+            shape = None
         if shape == (4,):
             low = high = array("initial_state", self.initial_state, (4,))
         elif shape == (2, 4):
@@ -127,8 +137,9 @@ class Task:
 
     @property
     def observation_space(self) -> spaces.Space[Array]:
-        """[h, theta]: encoders count without end."""
-        return spaces.Box(-np.inf, np.inf, (2,), np.float64)
+        """[h, theta], which encoders count without end, and x_d now and ahead where there is a reference."""
+        told = 0 if self.reference is None else 4 * (1 + self.preview)
+        return spaces.Box(-np.inf, np.inf, (2 + told,), np.float64)
 
     @property
     def action_space(self) -> spaces.Space[Array]:
@@ -165,6 +176,9 @@ UPRIGHT = Task(
 )
 """Defaults of SMOPendulumUpright-v0."""
 
+TRACKING = Task.of({"reference": shipped()}, HANGING)
+"""Defaults of SMOPendulumTracking-v0: the article's plant and the reference of its Table 7."""
+
 
 def applied_force(action: ArrayLike, n: int, bound: float) -> Array:
     """The force in N that the actuator applies, (n,): the actions (n, 1) clipped to its limit.
@@ -172,7 +186,7 @@ def applied_force(action: ArrayLike, n: int, bound: float) -> Array:
     Raises:
         ValueError: the shape is not (n, 1), or an action is not finite.
     """
-    wanted = np.asarray(action, dtype=np.float64)
+    wanted = np.array(action, dtype=np.float64)  # a copy: the kernel is compiled for plain arrays alone
     if wanted.shape != (n, 1):
         raise ValueError(f"action has shape {wanted.shape}, it must have shape {(n, 1)}")
     u = np.empty(n)
@@ -202,8 +216,8 @@ class Stepper:
             [*(w * task.control_period for w in weights), task.reward.failure, task.track_limit, task.angle_limit]
         )
 
-    def step(self, x: Array, params: Array, u: Array) -> tuple[Array, Array, Flags]:
-        """Advance the states ``x`` (4, n) in place by one control period.
+    def step(self, x: Array, params: Array, u: Array, x_d: Array) -> tuple[Array, Array, Flags]:
+        """Advance the states ``x`` (4, n) in place by one control period that should end at ``x_d`` (n, 4).
 
         Returns:
             The samples (substeps, 2, n), the rewards (n,) and whether the episode failed (n,).
@@ -211,17 +225,19 @@ class Stepper:
         n = x.shape[1]
         samples, reward, failed = np.empty((self.substeps, 2, n)), np.empty(n), np.empty(n, dtype=np.bool_)
         advance(x, params, u, self.dt, samples)
-        _judge(x, u, self._settings, reward, failed)
+        _judge(x, x_d, u, self._settings, reward, failed)
         return samples, reward, failed
 
 
 @kernel
-def _judge(x: Array, u: Array, settings: Array, reward: Array, failed: Flags) -> None:
+def _judge(x: Array, x_d: Array, u: Array, settings: Array, reward: Array, failed: Flags) -> None:
     q_h, q_theta, q_v, q_omega, r, penalty, track, angle = settings
     for i in range(len(u)):
         h, theta, v, omega = x[0, i], x[1, i], x[2, i], x[3, i]
-        cost = q_h * h * h + q_theta * theta * theta + q_v * v * v + q_omega * omega * omega + r * u[i] * u[i]
-        inside = abs(h) <= track and abs(theta) <= angle and math.isfinite(h + theta + v + omega)
+        e_h, e_theta, e_v, e_omega = h - x_d[i, 0], theta - x_d[i, 1], v - x_d[i, 2], omega - x_d[i, 3]
+        cost = q_h * e_h**2 + q_theta * e_theta**2 + q_v * e_v**2 + q_omega * e_omega**2 + r * u[i] ** 2
+        finite = math.isfinite(h + theta + v + omega + cost)
+        inside = finite and abs(h) <= track and abs(theta) <= angle
         failed[i] = not inside
-        cost = cost if math.isfinite(cost) else 0.0  # a diverged state has no cost, only the penalty
-        reward[i] = -cost if inside else -cost - penalty
+        # a state that is not finite has no cost, only the penalty
+        reward[i] = -(cost if finite else 0.0) - (0.0 if inside else penalty)

@@ -13,7 +13,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from ..validation import unknown
-from .pendulum import RESET_OPTIONS, PendulumEnv, UprightEnv
+from .desired import Desired
+from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .task import Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
@@ -63,6 +64,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._stepper = Stepper(self.task)
+        self._desired = Desired(self.task)
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._x = np.zeros((4, num_envs))
@@ -71,6 +73,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self._terminated = np.zeros(num_envs, dtype=np.bool_)
         self._truncated = np.zeros(num_envs, dtype=np.bool_)
         self._everywhere = np.ones(num_envs, dtype=np.bool_)
+        self._everywhere.flags.writeable = False  # infos share it
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
@@ -99,8 +102,11 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             if name not in (*RESET_OPTIONS, "reset_mask"):
                 raise ValueError(unknown("reset option", name, (*RESET_OPTIONS, "reset_mask")))
         mask = self._mask(options.pop("reset_mask", self._everywhere))
+        if not self._generators and not mask.all():
+            raise ResetNeeded("no episode has begun: the first reset() must be of all slots")
+        each = self._each(options)
         self._seed(seed, mask)
-        self._start(mask, options)
+        self._start(mask, each)
         return self._observation(), self._info(self._still(), np.zeros(self.num_envs))
 
     def step(self, actions: Array) -> tuple[Array, Array, Flags, Flags, dict[str, Any]]:  # type: ignore[override]
@@ -113,8 +119,9 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         if waiting:
             held = self._x[:, over]
             u[over] = 0.0
-        samples, reward, failed = self._stepper.step(self._x, self._params, u)
         self._steps_left -= 1
+        x_d = self._desired.states[self._k()]
+        samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
         terminated, truncated = failed, (self._steps_left == 0) & ~failed
         if waiting:
             reward[over] = 0.0
@@ -123,7 +130,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
                 terminated[over], truncated[over] = self._terminated[over], self._truncated[over]
             else:  # the step after the end is the reset (NEXT_STEP)
                 terminated[over] = truncated[over] = False
-                self._start(over, {})
+                self._start(over, [])
             samples[:, :, over] = self._x[:2, over]
         self._terminated, self._truncated = terminated.copy(), truncated.copy()
         info = self._info(samples, u)
@@ -134,11 +141,12 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
 
     def _restart(self, ended: Flags, final: dict[str, Any]) -> dict[str, Any]:
         """Start ended slots in the step that ended them (SAME_STEP): the last they gave goes to ``final_*``."""
+        observation = self._observation()
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
-            final_obs[i] = self._x[:2, i].copy()
+            final_obs[i] = observation[i].copy()
         final_info = {key: _only(value, ended) for key, value in final.items()}
-        self._start(ended, {})
+        self._start(ended, [])
         samples, force = final["samples"].copy(), final["force"].copy()
         samples[ended] = self._x[:2, ended].T[:, None]
         force[ended] = 0.0
@@ -163,17 +171,18 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         if len(seeds) != n:
             raise ValueError(f"seed has {len(seeds)} entries for {n} slots")
         fresh = not self._generators
-        if fresh:
-            self._generators, self._seeds = [None] * n, [-1] * n  # type: ignore[list-item]
-        for i, s in enumerate(seeds):
-            if fresh or (s is not None and mask[i]):
-                self._generators[i], self._seeds[i] = seeding.np_random(s)
+        drawn = [seeding.np_random(s) if fresh or (s is not None and mask[i]) else None for i, s in enumerate(seeds)]
+        kept = [None] * n if fresh else list(zip(self._generators, self._seeds, strict=True))
+        pairs = [new or old for new, old in zip(drawn, kept, strict=True)]
+        self._generators, self._seeds = [pair[0] for pair in pairs if pair], [pair[1] for pair in pairs if pair]
 
-    def _start(self, mask: Flags, options: dict[str, Any]) -> None:
-        each = [{} for _ in range(self.num_envs)] if not options else self._each(options)
-        for i in np.flatnonzero(mask):
-            self._params[:, i], self._x[:, i] = self.task.case(self.task.draw(self._generators[i]), each[i])
-        self._told_params = self._params.T.copy()  # never written to again
+    def _start(self, mask: Flags, each: list[dict[str, Any]]) -> None:
+        slots = np.flatnonzero(mask)
+        cases = [self.task.case(self.task.draw(self._generators[i]), each[i] if each else {}) for i in slots]
+        for i, (params, x) in zip(slots, cases, strict=True):
+            self._params[:, i], self._x[:, i] = params, x
+        self._params_told = self._params.T.copy()
+        self._params_told.flags.writeable = False  # infos share it
         self._steps_left[mask] = self.task.steps
         self._terminated[mask] = self._truncated[mask] = False
 
@@ -182,7 +191,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         n = self.num_envs
         return [
             {name: value[i] if np.shape(value) == (n, 4) else value for name, value in options.items()}
-            for i in range(n)
+            for i in range(n if options else 0)
         ]
 
     def _still(self) -> Array:
@@ -190,19 +199,29 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         return np.repeat(self._x[None, :2], self._stepper.substeps, axis=0)
 
     def _observation(self) -> Array:
-        return self._x[:2].T.copy()
+        told = self._desired.told[self._k()]
+        observation = np.empty((self.num_envs, 2 + told.shape[1]))
+        observation[:, :2] = self._x[:2].T
+        observation[:, 2:] = told
+        return observation
+
+    def _k(self) -> NDArray[np.int64]:
+        """The control instant that each slot is at; a slot that is held stays at its last."""
+        return np.minimum(self.task.steps - self._steps_left, self.task.steps)
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
         everywhere = self._everywhere
         return {
             "state": self._x.T.copy(),
             "_state": everywhere,
-            "params": self._told_params,
+            "params": self._params_told,
             "_params": everywhere,
             "force": force,
             "_force": everywhere,
             "samples": samples.transpose(2, 0, 1),
             "_samples": everywhere,
+            "desired": self._desired.positions[self._k()],
+            "_desired": everywhere,
         }
 
 
@@ -217,3 +236,9 @@ class UprightVectorEnv(PendulumVectorEnv):
     """The vector form of ``SMOPendulumUpright-v0``."""
 
     scalar = UprightEnv
+
+
+class TrackingVectorEnv(PendulumVectorEnv):
+    """The vector form of ``SMOPendulumTracking-v0``."""
+
+    scalar = TrackingEnv

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -14,13 +13,13 @@ from ..plant import STATE_NAMES
 Array = NDArray[np.float64]
 
 NAMES = (
-    "mse_h",  # mean of h^2 over the sampling instants, m^2
-    "mse_theta",  # mean of theta^2 over the sampling instants, rad^2
+    "mse_h",  # mean of (h - h_d)^2 over the sampling instants, m^2; h_d = 0 without a reference
+    "mse_theta",  # the same of theta, rad^2
     *(f"estimation_rms_{name}" for name in STATE_NAMES),  # of xhat - x over the control instants; NaN without observer
     "effort",  # integral of u^2, N^2 s
     "total_variation",  # sum of |u_k - u_{k-1}|, from u = 0, N
-    "peak_h",  # largest |h| at a sampling instant, m
-    "peak_theta",  # largest |theta| at a sampling instant, rad
+    "peak_h",  # largest |h - h_d| at a sampling instant, m
+    "peak_theta",  # the same of theta, rad
     "peak_force",  # largest |u|, N
     "duration",  # until the horizon or the failure, s
 )
@@ -32,10 +31,9 @@ def start(n: int) -> Array:
     return np.zeros((14, n))
 
 
-def add(sums: Array, info: dict[str, Any], observation: Array, over: NDArray[np.bool_]) -> None:
-    """Add one control period to the sums of all runs that are not over yet."""
-    estimated = observation.shape[1] == 6
-    _add(sums, info["samples"], info["state"], observation, estimated, info["force"], over)
+def add(sums: Array, info: dict[str, Any], xhat: Array, over: NDArray[np.bool_]) -> None:
+    """Add one control period, which ended with the estimates ``xhat`` (n, 4), to all runs that are not over yet."""
+    _add(sums, info["samples"], info["desired"], info["state"], xhat, info["force"], over)
 
 
 def finish(sums: Array, control_period: float) -> dict[str, Array]:
@@ -52,20 +50,18 @@ def finish(sums: Array, control_period: float) -> dict[str, Array]:
 
 
 @kernel
-def _add(
-    sums: Array, samples: Array, x: Array, observation: Array, estimated: bool, u: Array, over: NDArray[np.bool_]
-) -> None:
+def _add(sums: Array, samples: Array, desired: Array, x: Array, xhat: Array, u: Array, over: NDArray[np.bool_]) -> None:
     for i in range(len(u)):
         if over[i]:
             continue
         for k in range(samples.shape[1]):
-            h, theta = samples[i, k, 0], samples[i, k, 1]
+            h, theta = samples[i, k, 0] - desired[i, k, 0], samples[i, k, 1] - desired[i, k, 1]
             sums[0, i] += h * h
             sums[1, i] += theta * theta
             sums[8, i] = max(sums[8, i], abs(h))
             sums[9, i] = max(sums[9, i], abs(theta))
         for j in range(4):
-            error = observation[i, 2 + j] - x[i, j] if estimated else math.nan
+            error = xhat[i, j] - x[i, j]
             sums[2 + j, i] += error * error
         sums[6, i] += u[i] * u[i]
         sums[7, i] += abs(u[i] - sums[_PREVIOUS_FORCE, i])

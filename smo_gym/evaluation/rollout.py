@@ -87,7 +87,14 @@ def rollout(
     n = env.num_envs
     observation, info = env.reset(seed=seed, options=dict(options or {}))
     sums = metrics.start(n)
-    trace = _Recorder(trace_every, task, observation, info)
+    told = task.observation_space.shape[0]  # type: ignore[index]  # without an observer
+    observed = observation.shape[1] == told + 4
+
+    def estimate() -> Array:
+        return observation[:, -4:] if observed else np.full((n, 4), np.nan)
+
+    trace = _Recorder(trace_every, task.control_period)
+    trace.record(0, info, estimate())
     failed: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
     first, agent_state = np.ones(n, dtype=np.bool_), None
     later = ~first
@@ -98,9 +105,9 @@ def rollout(
         if failures:
             action = np.where(failed[:, None], 0.0, action)
         observation, _, ended, _, info = env.step(action)
-        metrics.add(sums, info, observation, failed)
+        metrics.add(sums, info, estimate(), failed)
         failed = ended.astype(np.bool_, copy=False)
-        trace.record(k, observation, info)
+        trace.record(k, info, estimate())
         if k % 100 == 0:
             progress(100)
         failures = int(np.count_nonzero(failed))
@@ -111,14 +118,12 @@ def rollout(
 
 
 class _Recorder:
-    def __init__(self, every: int | None, task: Task, observation: Array, info: dict[str, Any]) -> None:
-        self._every, self._period = every, task.control_period
+    def __init__(self, every: int | None, period: float) -> None:
+        self._every, self._period = every, period
         self._rows: list[tuple[float, Array, Array, Array]] = []
-        self.record(0, observation, info)
 
-    def record(self, k: int, observation: Array, info: dict[str, Any]) -> None:
+    def record(self, k: int, info: dict[str, Any], xhat: Array) -> None:
         if self._every is not None and k % self._every == 0:
-            xhat = observation[:, 2:6] if observation.shape[1] == 6 else np.full((len(observation), 4), np.nan)
             self._rows.append((k * self._period, info["state"].T, xhat.T, info["force"]))
 
     def traces(self) -> Traces | None:

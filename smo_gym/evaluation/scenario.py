@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
+import gymnasium
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..controllers import LQR, SlidingModeController
 from ..observers import SlidingModeObserver
 from ..validation import unknown
+from ..wrappers import VectorObserverWrapper
 
 T = TypeVar("T")
 Four = tuple[float, float, float, float]
@@ -30,16 +32,23 @@ class Setting(_Strict, Generic[T]):
 
 
 class ObserverSettings(_Strict):
-    """The sliding mode observer that a controller's tables were made with."""
+    """The sliding mode observer that a controller's tables were made with; see there for the units."""
 
-    gains: Setting[str]
+    gains: Setting[str | dict[str, tuple[float, float]]]
     slopes: Setting[tuple[float, float]]
     xhat0: Setting[Four]
+    time_constant: Setting[float] = Setting[float](value=0.0, source="chosen")
+    step: Setting[float | None] = Setting[float | None](value=None, source="chosen")
 
     def build(self, compensation: bool) -> SlidingModeObserver:
         """The observer with the compensation on or off."""
         return SlidingModeObserver(
-            gains=self.gains.value, slopes=self.slopes.value, xhat0=self.xhat0.value, compensation=compensation
+            gains=self.gains.value,
+            slopes=self.slopes.value,
+            xhat0=self.xhat0.value,
+            time_constant=self.time_constant.value,
+            step=self.step.value,
+            compensation=compensation,
         )
 
 
@@ -86,9 +95,9 @@ class Scenario(_Strict):
     horizon: Setting[float]
     force_limit: Setting[float | None]
     track_limit: Setting[float | None]
-    uncertainty: Setting[tuple[Fraction, ...]]
-    initial_states: Setting[dict[str, Four]]
-    controllers: dict[str, ControllerSettings]
+    uncertainty: Setting[Annotated[tuple[Fraction, ...], Field(min_length=1)]]
+    initial_states: Setting[Annotated[dict[str, Four], Field(min_length=1)]]
+    controllers: Annotated[dict[str, ControllerSettings], Field(min_length=1)]
 
     @property
     def options(self) -> dict[str, Any]:
@@ -107,24 +116,42 @@ def load(path: Path) -> Scenario:
     Raises:
         ValueError: the file cannot be read, is no YAML, or has an unknown, missing or bad value, named with its place.
     """
-    data = _read(path)
+    data = _read(path, ())
     try:
-        return Scenario.model_validate(data)
+        scenario = Scenario.model_validate(data)
+        _try(scenario)
     except ValidationError as error:
         raise ValueError(f"{path}: " + "; ".join(_explain(e) for e in error.errors())) from None
+    except (ValueError, TypeError, gymnasium.error.Error) as error:
+        raise ValueError(f"{path}: {error}") from None
+    return scenario
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _try(scenario: Scenario) -> None:
+    """Make everything once, so that a value that is not allowed is noticed before any run."""
+    env = gymnasium.make_vec(scenario.environment, 1, **scenario.options)
+    for settings in scenario.controllers.values():
+        settings.build(scenario.control_period.value)
+        VectorObserverWrapper(env, settings.observer.build(True))
+
+
+def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+    if path.resolve() in above:
+        raise ValueError(f"{path}: extends itself")
     try:
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
     except yaml.YAMLError as error:
-        raise ValueError(f"{path}: is no YAML ({' '.join(str(error).split())})") from None
+        raise ValueError(f"{path}: is not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(data, dict):
         raise ValueError(f"{path}: must be a mapping of settings")
     base = data.pop("extends", None)
-    return data if base is None else _merged(_read(path.parent / base), data)
+    if base is None:
+        return data
+    if not isinstance(base, str):
+        raise ValueError(f"{path}: extends={base!r} must be the name of a file")
+    return _merged(_read(path.parent / base, (*above, path.resolve())), data)
 
 
 def _merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:

@@ -55,6 +55,7 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
         Group(scenario, controller, level, case, arm, runs if level > 0.0 else 1)
         for scenario in scenarios
         for controller in controllers
+        if controller in scenario.controllers
         for level in sorted({0.0, *scenario.uncertainty.value})
         for case in scenario.initial_states.value
         for arm in arms
@@ -98,24 +99,26 @@ def simulated_seconds(wanted: Iterable[Group]) -> float:
 
 def _run(batch: Sequence[Group], seed: int, progress: Callable[[float], object]) -> list[Outcome]:
     scenario, settings = batch[0].scenario, batch[0].settings
+    n = sum(group.runs for group in batch)
+    env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
+        scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **scenario.options
+    )
+    nominal: CartPendulum = env.unwrapped.task.params  # type: ignore[attr-defined]
     draws = deviations(seed, max(group.runs for group in batch))
     states, plants, observers = [], [], []
     for group in batch:
         observer = settings.observer.build(group.arm == "with")
         for draw in draws[: group.runs]:
             states.append(group.scenario.initial_states.value[group.case])
-            plants.append(CartPendulum().perturbed(group.uncertainty * draw).as_array())
+            plants.append(nominal.perturbed(group.uncertainty * draw).as_array())
             observers.append(observer)
-    env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
-        scenario.environment, len(states), autoreset_mode=AutoresetMode.DISABLED, **scenario.options
-    )
     observed = VectorObserverWrapper(env, "oracle" if batch[0].arm == "oracle" else observers)
     dt = scenario.control_period.value
     result = rollout(
         observed,
         settings.build(dt),
         options={"state": np.array(states), "params": np.array(plants)},
-        progress=lambda steps: progress(steps * dt * len(states)),
+        progress=lambda steps: progress(steps * dt * n),
     )
     edges = np.cumsum([group.runs for group in batch])[:-1]
     failed = np.split(result.failed, edges)

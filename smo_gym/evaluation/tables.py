@@ -62,8 +62,9 @@ def verdict(rows: Sequence[Result]) -> str:
     return (
         f"{off.size} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(off**2)):.1f} %, "
         f"{np.count_nonzero(np.abs(np.expm1(off)) <= 0.1)} within 10 %, "
-        f"furthest off {100 * np.expm1(furthest):+.1f} %; "
-        f"averages off {', '.join(f'{100 * np.expm1(average):+.1f} %' for average in averages)}. {failed}"
+        f"furthest off {100 * np.expm1(furthest):+.1f} %. "
+        + (f"Averages off {', '.join(f'{100 * np.expm1(a):+.1f} %' for a in averages)}. " if averages else "")
+        + failed
     )
 
 

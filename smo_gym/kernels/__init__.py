@@ -46,10 +46,11 @@ def kernel(function: F) -> F:
     is therefore stamped with the sources of this package too, so that no stale physics is ever run.
     """
     dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    dispatcher.enable_caching()
     try:
+        dispatcher.enable_caching()
         index = dispatcher._cache._cache_file
         index._source_stamp = (index._source_stamp, _SOURCES)
-    except AttributeError:  # another Numba keeps its stamp elsewhere: compile in every process rather than trust it
+    except (RuntimeError, AttributeError):
+        # no folder to cache in, or another Numba keeps its stamp elsewhere: compile in every process
         dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
     return cast(F, dispatcher)

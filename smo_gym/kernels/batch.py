@@ -32,7 +32,7 @@ def load(work: NDArray[np.float64], row: int, rows: NDArray[np.float64], first: 
 
 @inlined
 def store(work: NDArray[np.float64], row: int, rows: NDArray[np.float64], first: int, lanes: int) -> None:
-    """The way back of :func:`load`."""
+    """Copy the workspace's rows back into a (rows, n) array, the reverse of :func:`load`."""
     for r in range(rows.shape[0]):
         source, target = work[(row + r) * LANES :], rows[r, first:]
         for i in range(lanes):

@@ -13,11 +13,11 @@ def control_affine(
     The four denominators are one, ``l (M_c + m sin^2 theta)``, up to a factor l. Arithmetic alone: :func:`plain` of
     it takes arrays and symbols too.
     """
-    per = 1.0 / (l * (M_c + m * sin * sin))
+    inverse = 1.0 / (l * (M_c + m * sin * sin))
     centrifugal = m * l * omega * omega * sin
-    f_h = (centrifugal - m * g * sin * cos) * l * per
-    f_theta = ((M_c + m) * g * sin - centrifugal * cos) * per
-    return f_h, f_theta, l * per, -cos * per
+    f_h = (centrifugal - m * g * sin * cos) * l * inverse
+    f_theta = ((M_c + m) * g * sin - centrifugal * cos) * inverse
+    return f_h, f_theta, l * inverse, -cos * inverse
 
 
 @inlined

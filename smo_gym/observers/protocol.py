@@ -5,6 +5,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..plant import CartPendulum
+
 Array = NDArray[np.float64]
 
 
@@ -29,8 +31,8 @@ class Estimator(Protocol):
         """The estimates [h, theta, h', theta'], (4, n)."""
         ...
 
-    def reset(self, slots: NDArray[np.bool_]) -> None:
-        """Start the marked slots, (n,), anew."""
+    def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:
+        """Start the marked slots, (n,), anew. Only an oracle reads the plants' states ``truth``, (4, n)."""
         ...
 
     def update(self, period: Period) -> None:
@@ -41,8 +43,10 @@ class Estimator(Protocol):
 class Observer(Protocol):
     """The settings of an observer, constant while it works."""
 
-    def start(self, n: int, dt: float, force: float) -> Estimator:
+    def start(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Estimator:
         """An estimator of n slots for positions sampled every ``dt`` seconds and forces of at most ``force`` N.
+
+        ``nominal`` is the plant without uncertainty, all that an observer may know of the plants.
 
         Raises:
             ValueError: the observer cannot work with these.

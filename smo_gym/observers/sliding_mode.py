@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import numbers
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +18,7 @@ from ..kernels.cart_pendulum import drift_and_gain
 from ..kernels.elementary import tanh
 from ..kernels.rk4 import rk4
 from ..plant import CartPendulum
-from ..validation import array, choice, multiple, number, unknown
+from ..validation import array, choice, mapping, multiple, number
 from .protocol import Period
 
 Array = NDArray[np.float64]
@@ -64,10 +66,10 @@ class Gains:
         if isinstance(gains, str):
             return cls(**OBSERVER_GAINS[choice("column of Table 3", gains, OBSERVER_GAINS)])
         known = [f.name for f in fields(cls)]
-        for name in gains:
-            if name not in known:
-                raise ValueError(unknown("observer gain", name, known))
-        return cls(**gains)  # type: ignore[arg-type]
+        values = mapping("observer gain", gains, known)
+        if missing := [name for name in known if name not in values]:
+            raise ValueError(f"observer gains lack {', '.join(missing)}")
+        return cls(**values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +97,7 @@ class SlidingModeObserver:
         time_constant: of the low-pass for the equivalent value in s; 0 for none.
         step: integration step in s, which divides the sampling period; None for the sampling period itself.
         xhat0: initial estimate, shape (4,).
-        model: nominal plant (Table 2).
+        model: nominal plant; None for the one that the environment draws its plants around.
 
     Raises:
         ValueError: a value is not allowed, or k_p is infinite without a time constant.
@@ -107,19 +109,20 @@ class SlidingModeObserver:
     time_constant: float = 0.0
     step: float | None = None
     xhat0: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
-    model: CartPendulum = field(default_factory=CartPendulum)
+    model: CartPendulum | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "gains", Gains.of(self.gains))
-        object.__setattr__(self, "model", CartPendulum.of(self.model))
+        if self.model is not None:
+            object.__setattr__(self, "model", CartPendulum.of(self.model))
         object.__setattr__(self, "xhat0", tuple(array("xhat0", self.xhat0, (4,)).tolist()))
         if not isinstance(self.compensation, bool):
             raise ValueError(f"compensation={self.compensation!r} must be True or False")
-        slopes = np.asarray(self.slopes, dtype=np.float64)
-        if slopes.shape != (2,) or not (slopes > 0.0).all():
+        if np.shape(self.slopes) != (2,) or not all(isinstance(k, numbers.Real) and k > 0.0 for k in self.slopes):
             raise ValueError(f"slopes={self.slopes!r} must be two positive numbers (math.inf for the exact sgn)")
-        object.__setattr__(self, "slopes", tuple(slopes.tolist()))
-        if number("time_constant", self.time_constant) < 0.0:
+        object.__setattr__(self, "slopes", tuple(map(float, self.slopes)))
+        object.__setattr__(self, "time_constant", number("time_constant", self.time_constant))
+        if self.time_constant < 0.0:
             raise ValueError(f"time_constant={self.time_constant!r} must be at least 0")
         if self.time_constant == 0.0 and math.isinf(self.slopes[0]):
             raise ValueError(
@@ -141,16 +144,20 @@ class SlidingModeObserver:
         fastest = max(rates, default=0.0)
         return _RK4_LIMIT / fastest if fastest > 0.0 else math.inf
 
-    def start(self, n: int, dt: float, force: float) -> _Bank:
+    def as_dict(self) -> dict[str, Any]:
+        """The settings by name, of plain types, as the constructor takes them."""
+        return asdict(self)
+
+    def start(self, n: int, dt: float, force: float, nominal: CartPendulum) -> _Bank:
         """An estimator of n slots, all with these settings.
 
         Raises:
             ValueError: the step does not divide ``dt`` or is too large for the gains (with the largest that works).
         """
-        return self.start_each([self] * n, dt, force)
+        return self.start_each([self] * n, dt, force, nominal)
 
     @staticmethod
-    def start_each(observers: Sequence[SlidingModeObserver], dt: float, force: float) -> _Bank:
+    def start_each(observers: Sequence[SlidingModeObserver], dt: float, force: float, nominal: CartPendulum) -> _Bank:
         """An estimator whose slot i has the settings of ``observers[i]``.
 
         Raises:
@@ -165,7 +172,7 @@ class SlidingModeObserver:
         return _Bank(
             xhat0=np.stack([o.xhat0 for o in observers], axis=1),
             settings=np.ascontiguousarray(np.stack([columns[id(o)] for o in observers], axis=1)),
-            nominal=first.model.as_array(),
+            nominal=(first.model or nominal).as_array(),
             dt=dt,
             steps=steps,
         )
@@ -179,7 +186,7 @@ class SlidingModeObserver:
             raise ValueError(
                 f"step={step:g} s is too large for these gains and slopes with |u| up to {force:g} N: RK4 is stable up "
                 f"to {largest:.4g} s; the largest step that divides the sampling period is "
-                f"step={dt / math.ceil(dt / largest):.6g}"
+                f"step={dt / math.ceil(dt / largest)!r}"
             )
         return steps
 
@@ -208,7 +215,7 @@ class _Bank:
     def xhat(self) -> Array:
         return self._state[:4]
 
-    def reset(self, slots: NDArray[np.bool_]) -> None:
+    def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:
         self._state[:, slots] = self._initial[:, slots]
 
     def update(self, period: Period) -> None:

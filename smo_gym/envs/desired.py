@@ -1,0 +1,41 @@
+"""Where the plant should be at the instants that an episode meets."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..validation import multiple
+from .task import Task
+
+Array = NDArray[np.float64]
+
+
+class Desired:
+    """The desired states of a task: zero, or a reference and then rest at its end.
+
+    Attributes:
+        states: x_d at each control instant, (steps + 1, 4).
+        positions: [h_d, theta_d] at the sampling instants of the control period that ends at each control instant,
+            (steps + 1, substeps, 2).
+        told: what the observation holds of it, x_d now and at the next ``preview`` control instants,
+            (steps + 1, 4 (1 + preview)); (steps + 1, 0) without a reference.
+    """
+
+    def __init__(self, task: Task) -> None:
+        n = task.substeps
+        if task.reference is None:
+            self.states = np.zeros((task.steps + 1, 4))
+            self.positions = np.zeros((task.steps + 1, n, 2))
+            self.told = np.zeros((task.steps + 1, 0))
+            return
+        multiple("reference horizon", task.reference.horizon, "dt", task.dt)
+        x_d = task.reference.trajectory(task.dt).T
+        needed = (task.steps + task.preview) * n + 1
+        rest = np.repeat([task.reference.xT], max(needed - len(x_d), 0), axis=0)
+        x_d = np.concatenate([x_d, rest])
+        ahead = x_d[:needed:n]
+        self.states = ahead[: task.steps + 1]
+        later = x_d[1 : task.steps * n + 1, :2].reshape(task.steps, n, 2)
+        self.positions = np.concatenate([np.repeat(x_d[None, :1, :2], n, axis=1), later])
+        self.told = np.concatenate([ahead[j : j + task.steps + 1] for j in range(task.preview + 1)], axis=1)
