@@ -23,7 +23,7 @@ from smo_gym.evaluation.statistics import results
 from smo_gym.validation import unknown
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
-SCENARIOS = ("regulation", "initial-conditions")
+SCENARIOS = ("regulation", "initial-conditions", "tracking")
 ARMS: dict[str, dict[str, tuple[str, ...]]] = {
     "smo": {"on": ("with",), "off": ("without",), "both": ("without", "with")},
     "oracle": {"on": ("oracle",), "off": ("oracle",), "both": ("oracle",)},
@@ -41,7 +41,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--scenario",
         type=one_of("scenario", (*SCENARIOS, "all")),
         default="all",
-        help="regulation (Table 4), initial-conditions (Table 5) or all (default)",
+        help="regulation (Table 4), initial-conditions (Table 5), tracking (Table 7) or all (default)",
     )
     add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
     add(
@@ -161,6 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     numbers = results(outcomes)
     print(tables.render(numbers, "simple", rms=False))
     print(tables.diagnostics(outcomes, "simple"))
+    print(f"\n{tables.summary(numbers)}")
     resolved = {
         "command": {key: str(value) if isinstance(value, Path) else value for key, value in vars(args).items()},
         "versions": {"python": platform.python_version()}

@@ -7,6 +7,7 @@ with CasADi and IPOPT (the extra ``reference``). A solution is its force; the st
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from importlib import resources
@@ -21,7 +22,8 @@ from .plant import CartPendulum, advance
 from .validation import array, multiple, number, unknown
 
 Array = NDArray[np.float64]
-_DEGREE = 4  # Radau points in an element
+_DEGREE = 4  # Radau points in a finite element
+_LONGEST = 0.05  # s; an element of the force is divided into finite elements no longer than this
 
 
 class ReferenceNotFound(RuntimeError):
@@ -112,6 +114,7 @@ def minimum_energy(
     force_limit: float = 26.0,
     elements: int = 160,
     model: CartPendulum | None = None,
+    refine: int = 1,
 ) -> Reference:
     """Minimise the time integral of the energy (53) subject to (3)-(6), the two states and ``|F| <= force_limit``.
 
@@ -122,8 +125,9 @@ def minimum_energy(
         xT: final state, shape (4,).
         horizon: T in s.
         force_limit: in N.
-        elements: finite elements, each with a constant force.
+        elements: intervals of equal length, each with a constant force.
         model: plant (Table 2 by default).
+        refine: divide the finite elements, which are at most 50 ms long, by this much more.
 
     Raises:
         ValueError: an argument is not allowed.
@@ -133,8 +137,9 @@ def minimum_energy(
     start, end = array("x0", x0, (4,)), array("xT", xT, (4,))
     T = number("horizon", horizon, above=0.0)
     bound = number("force_limit", force_limit, above=0.0)
-    if not isinstance(elements, int) or elements < 1:
-        raise ValueError(f"elements={elements!r} must be a positive integer")
+    for name, value in (("elements", elements), ("refine", refine)):
+        if not isinstance(value, int) or value < 1:
+            raise ValueError(f"{name}={value!r} must be a positive integer")
     try:
         import casadi
     except ImportError:
@@ -149,23 +154,25 @@ def minimum_energy(
 
     points = casadi.collocation_points(_DEGREE, "radau")
     C, _, B = casadi.collocation_coeff(points)
-    h = T / elements
+    parts = refine * math.ceil(T / elements / _LONGEST)
+    n = elements * parts
+    h = T / n
     problem = casadi.Opti()
     u = problem.variable(elements)
-    x = problem.variable(4, elements * _DEGREE + 1)  # the last point of an element is the first of the next
+    x = problem.variable(4, n * _DEGREE + 1)  # the last point of a finite element is the first of the next
     cost = 0
-    for k in range(elements):
+    for k in range(n):
         inside = x[:, k * _DEGREE : (k + 1) * _DEGREE + 1]
         slopes = casadi.mtimes(inside, C)
         for j in range(_DEGREE):
             state = inside[:, j + 1]
-            problem.subject_to(slopes[:, j] == h * rates(state, u[k]))
+            problem.subject_to(slopes[:, j] == h * rates(state, u[k // parts]))
             cost += h * B[j] * mechanical_energy(casadi.cos(state[1]), state[2], state[3], *parameters)
     problem.minimize(cost)
     problem.subject_to(x[:, 0] == start)
     problem.subject_to(x[:, -1] == end)
     problem.subject_to(problem.bounded(-bound, u, bound))
-    problem.set_initial(x, start[:, None] + np.linspace(0.0, 1.0, elements * _DEGREE + 1) * (end - start)[:, None])
+    problem.set_initial(x, start[:, None] + np.linspace(0.0, 1.0, n * _DEGREE + 1) * (end - start)[:, None])
     quiet: Any = {"print_time": False, "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 1000}}
     problem.solver("ipopt", quiet)
     try:

@@ -36,7 +36,7 @@ def published_cells(rows, controller, table):
 
 @pytest.fixture(scope="module")
 def both_tables(tmp_path_factory):
-    """Tables 4 and 5 for both controllers with the default 10 runs."""
+    """All tables for both controllers with the default 10 runs."""
     out = tmp_path_factory.mktemp("both")
     done = evaluate("--controller", "all", "--scenario", "all", "--out", out)
     return done.stdout, read(out / "results.csv"), out
@@ -49,6 +49,8 @@ def test_all_published_cells_are_measured(both_tables):
         assert len(published_cells(rows, controller, "5")) == 16
         for table in ("4", "5"):
             assert f"Table {table}, {controller.upper()}" in text
+    assert len(published_cells(rows, "smc-tracking", "7")) == 24
+    assert "104 published MSE cells in all" in text
     assert all(row["measured"] for row in rows)
     assert {row["uncertainty_percent"] for row in rows if row["table"] == "4"} == {
         *["0", "5", "7", "10", "15", "18", "20"],
@@ -64,7 +66,7 @@ def test_columns_begin_with_those_of_the_published_data(both_tables):
     assert [*rows[0]][len(keys) :] == ["published", "measured", "ci_low", "ci_high", "runs", "failures", "median"]
     ours = {tuple(row[key] for key in keys): row["published"] for row in rows}
     for row in published:
-        if row["table"] in "45":
+        if row["table"] in "457":
             assert float(ours[tuple(row[key] for key in keys)]) == float(row["value"])
 
 
@@ -94,7 +96,7 @@ def test_everything_that_was_promised_is_written(both_tables):
         "note": "Table 6",
     }
     runs = read(out / "runs.csv")
-    assert len(runs) == 2 * 2 * (6 * 10 + 1 + 4 * (10 + 1))
+    assert len(runs) == 2 * 2 * (6 * 10 + 1 + 4 * (10 + 1) + 6 * 10 + 1)
     assert not any(int(run["failed"]) for run in runs)
 
 
@@ -185,7 +187,7 @@ def test_an_interruption_is_said_and_leaves_old_results(tmp_path):
     (out / "results.csv").write_text("old")
     command = [sys.executable, str(EVALUATE), "--runs", "2000", "--out", str(out)]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    assert process.stderr.readline() == "80020 runs to do\n"
+    assert process.stderr.readline() == "128024 runs to do\n"
     process.send_signal(signal.SIGINT)
     _, stderr = process.communicate(timeout=60)
     assert process.returncode == 130

@@ -30,9 +30,17 @@ def test_its_cost_is_the_integral_of_the_energy(solved):
 
 
 def test_a_finer_mesh_changes_the_cost_by_less_than_a_thousandth(solved):
-    finer = minimum_energy(START, horizon=4.0, force_limit=26.0, elements=160)
-    assert abs(finer.cost / solved.cost - 1) < 1e-3
-    assert finer.cost <= solved.cost + 1e-9  # it has every force of the coarser one
+    finer = minimum_energy(START, horizon=4.0, force_limit=26.0, elements=80, refine=2)
+    assert abs(finer.cost / solved.cost - 1) < 1e-6
+    freer = minimum_energy(START, horizon=4.0, force_limit=26.0, elements=160)
+    assert abs(freer.cost / solved.cost - 1) < 1e-3
+    assert freer.cost <= solved.cost + 1e-9  # it has every force of the coarser one
+
+
+def test_long_elements_are_as_exact_as_short_ones():
+    pytest.importorskip("casadi")
+    coarse = minimum_energy(START, horizon=8.0, force_limit=26.0, elements=16)
+    assert np.abs(coarse.trajectory(0.001)[:, -1]).max() < 1e-6
 
 
 def test_any_other_force_that_ends_there_costs_more(solved):

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..controllers import LQR, SlidingModeController
 from ..observers import SlidingModeObserver
+from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
 from ..validation import unknown
 from ..wrappers import VectorObserverWrapper
 
@@ -85,11 +86,23 @@ class SmcSettings(_Strict):
 ControllerSettings = Annotated[LqrSettings | SmcSettings, Field(discriminator="law")]
 
 
+class ReferenceSettings(_Strict):
+    """The minimum-energy reference of a tracking scenario, from its initial state, over its horizon."""
+
+    end: Setting[Four]
+    force_limit: Setting[float]
+    elements: Setting[Annotated[int, Field(ge=1)]]
+
+
 class Scenario(_Strict):
-    """One table: its environment, its rows (uncertainty levels times initial states) and its controllers."""
+    """One table: its environment, its rows (uncertainty levels times initial states) and its controllers.
+
+    ``suffix`` is what the published data appends to a controller's name.
+    """
 
     table: str
     title: str
+    suffix: str = ""
     environment: str
     control_period: Setting[float]
     horizon: Setting[float]
@@ -98,11 +111,31 @@ class Scenario(_Strict):
     uncertainty: Setting[Annotated[tuple[Fraction, ...], Field(min_length=1)]]
     initial_states: Setting[Annotated[dict[str, Four], Field(min_length=1)]]
     controllers: Annotated[dict[str, ControllerSettings], Field(min_length=1)]
+    reference: ReferenceSettings | None = None
+
+    def trajectory(self) -> Reference | None:
+        """The reference to follow: the shipped one where it answers to these settings, else solved for.
+
+        Raises:
+            ImportError: it must be solved for, and CasADi is missing.
+            ReferenceNotFound: there is none.
+        """
+        if self.reference is None:
+            return None
+        (x0,) = self.initial_states.value.values()
+        settings = self.reference
+        wanted = (x0, settings.end.value, self.horizon.value, settings.force_limit.value, settings.elements.value)
+        ours = shipped()
+        if wanted == (ours.x0, ours.xT, ours.horizon, ours.force_limit, len(ours.u)):
+            return ours
+        return minimum_energy(*wanted)
 
     @property
     def options(self) -> dict[str, Any]:
         """Options of the environment."""
+        tracking = {} if self.reference is None else {"reference": self.trajectory(), "preview": 0}
         return {
+            **tracking,
             "control_period": self.control_period.value,
             "horizon": self.horizon.value,
             "force_limit": self.force_limit.value,
@@ -122,13 +155,15 @@ def load(path: Path) -> Scenario:
         _try(scenario)
     except ValidationError as error:
         raise ValueError(f"{path}: " + "; ".join(_explain(e) for e in error.errors())) from None
-    except (ValueError, TypeError, gymnasium.error.Error) as error:
+    except (ValueError, TypeError, ImportError, ReferenceNotFound, gymnasium.error.Error) as error:
         raise ValueError(f"{path}: {error}") from None
     return scenario
 
 
 def _try(scenario: Scenario) -> None:
     """Make everything once, so that a value that is not allowed is noticed before any run."""
+    if scenario.reference is not None and len(scenario.initial_states.value) != 1:
+        raise ValueError("initial_states must hold one state: a reference begins at one")
     env = gymnasium.make_vec(scenario.environment, 1, **scenario.options)
     for settings in scenario.controllers.values():
         settings.build(scenario.control_period.value)

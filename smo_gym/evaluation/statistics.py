@@ -63,7 +63,7 @@ def _rows(outcomes: Sequence[Outcome]) -> list[Row]:
     """The rows of each controller's tables in order, and its average over all rows but the nominal plant's."""
     tables: dict[tuple[str, str], dict[tuple[str, str], list[Outcome]]] = {}
     for outcome in outcomes:
-        table = tables.setdefault((outcome.group.scenario.table, outcome.group.controller), {})
+        table = tables.setdefault((outcome.group.scenario.table, outcome.group.name), {})
         table.setdefault(_place(outcome), []).append(outcome)
     found: list[Row] = []
     for table in tables.values():
@@ -86,7 +86,7 @@ def _place(outcome: Outcome) -> tuple[str, str]:
 def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> list[Result]:
     """MSE and RMS of one arm, averaged over rows."""
     group = rows[0].group
-    cell = Cell(group.scenario.table, group.controller, uncertainty, case, "mse", state, group.arm)
+    cell = Cell(group.scenario.table, group.name, uncertainty, case, "mse", state, group.arm)
     values, complete = _runs(rows, state)
     low, high = _interval(values[complete])
     mse = Result(

@@ -33,6 +33,11 @@ class Group:
     runs: int
 
     @property
+    def name(self) -> str:
+        """What the published data calls its controller."""
+        return self.controller + self.scenario.suffix
+
+    @property
     def settings(self) -> ControllerSettings:
         """Of its controller."""
         return self.scenario.controllers[self.controller]
@@ -80,15 +85,17 @@ def measure(
         seed: of the plants.
         progress: called with the simulated seconds (over all slots) done since the last call.
     """
+    options = {group.scenario.title: group.scenario.options for group in wanted}
     batches: dict[Any, list[int]] = {}
     for index, group in enumerate(wanted):
         scenario = group.scenario
-        key = (scenario.environment, str(scenario.options), group.settings, group.arm == "oracle")
+        key = (scenario.environment, repr(options[scenario.title]), repr(group.settings), group.arm == "oracle")
         batches.setdefault(key, []).append(index)
     outcomes: dict[int, Outcome] = {}
     for indices in batches.values():
-        for index, outcome in zip(indices, _run([wanted[i] for i in indices], seed, progress), strict=True):
-            outcomes[index] = outcome
+        batch = [wanted[i] for i in indices]
+        found = _run(batch, options[batch[0].scenario.title], seed, progress)
+        outcomes.update(zip(indices, found, strict=True))
     return [outcomes[index] for index in range(len(wanted))]
 
 
@@ -97,11 +104,13 @@ def simulated_seconds(wanted: Iterable[Group]) -> float:
     return sum(group.runs * group.scenario.horizon.value for group in wanted)
 
 
-def _run(batch: Sequence[Group], seed: int, progress: Callable[[float], object]) -> list[Outcome]:
+def _run(
+    batch: Sequence[Group], options: dict[str, Any], seed: int, progress: Callable[[float], object]
+) -> list[Outcome]:
     scenario, settings = batch[0].scenario, batch[0].settings
     n = sum(group.runs for group in batch)
     env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
-        scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **scenario.options
+        scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **options
     )
     nominal: CartPendulum = env.unwrapped.task.params  # type: ignore[attr-defined]
     draws = deviations(seed, max(group.runs for group in batch))

@@ -68,17 +68,27 @@ def verdict(rows: Sequence[Result]) -> str:
     )
 
 
+def summary(results: Sequence[Result]) -> str:
+    """How many published MSE cells are met."""
+    cells = [r for r in results if r.cell.metric == "mse" and not r.cell.is_average and math.isfinite(r.deviation)]
+    near = sum(abs(math.expm1(r.deviation)) <= 0.1 for r in cells)
+    inside = sum(r.ci_low <= r.published <= r.ci_high for r in cells)
+    return (
+        f"{len(cells)} published MSE cells in all: {near} within 10 %, {inside} within our 95 % interval of the mean."
+    )
+
+
 def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
     """What else the runs showed, a mean over each controller's runs that did not fail."""
     header = ("table", "controller", "arm", *_DIAGNOSTICS.values())
     rows = []
-    keys = dict.fromkeys((o.group.scenario.table, o.group.controller) for o in outcomes)
+    keys = dict.fromkeys((o.group.scenario.table, o.group.name) for o in outcomes)
     for table, controller in keys:
         for arm in ARMS:
             chosen = [
                 o
                 for o in outcomes
-                if (o.group.scenario.table, o.group.controller, o.group.arm) == (table, controller, arm)
+                if (o.group.scenario.table, o.group.name, o.group.arm) == (table, controller, arm)
                 and o.group.uncertainty > 0.0
             ]
             if chosen:
@@ -115,7 +125,7 @@ def runs_csv(outcomes: Sequence[Outcome]) -> str:
     def lines() -> Iterable[list[object]]:
         for outcome in outcomes:
             group = outcome.group
-            place = [group.scenario.table, group.controller, group.uncertainty, group.case, group.arm]
+            place = [group.scenario.table, group.name, group.uncertainty, group.case, group.arm]
             for run, failed in enumerate(outcome.failed):
                 yield [*place, run, int(failed), *(_exact(outcome.metrics[name][run]) for name in NAMES)]
 
