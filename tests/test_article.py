@@ -3,8 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from smo_gym import CartPendulum, article
+from smo_gym.article import consistency
 from smo_gym.evaluation import scenario
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
@@ -48,6 +50,20 @@ def test_averages_and_reductions_of_table_4_follow_from_its_cells():
             assert abs(mean["without"] - without) < 6e-5
             assert abs(mean["with"] - with_) < 6e-6
             assert abs(100 * (1 - mean["with"] / mean["without"]) - reduction) < 0.02
+
+
+def test_what_the_article_says_of_its_own_cells():
+    found = consistency.checks()
+    assert len(found) == 72 + 64 + 2
+    disagreeing = [one for one in found if one.agrees != "yes"]
+    averages_of_table_5 = [one for one in disagreeing if one.table == "5"]
+    assert {(one.row, one.quantity, one.agrees) for one in averages_of_table_5} == {
+        ("average", "mse reduction", "as the mean of reductions")
+    }
+    assert len(averages_of_table_5) == 4
+    (claim,) = (one for one in disagreeing if one.table != "5")
+    assert (claim.table, claim.state, claim.printed, claim.agrees) == ("abstract", "theta", 29.0, "no")
+    assert claim.recomputed == pytest.approx(18.55, abs=0.01)
 
 
 def test_table_2_is_the_default_plant():
