@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
@@ -12,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ..controllers import LQR, SlidingModeController
 from ..observers import SlidingModeObserver
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
+from ..theorem import OperatingSet
 from ..validation import unknown
 from ..wrappers import VectorObserverWrapper
 
@@ -143,6 +145,43 @@ class Scenario(_Strict):
         }
 
 
+class OperatingSetSettings(_Strict):
+    """Bounds of states and estimates, and the level of uncertainty."""
+
+    theta: Setting[float]
+    speed: Setting[tuple[float, float]]
+    uncertainty: Setting[Fraction]
+
+
+class TheoremSettings(_Strict):
+    """An operating set, gains designed for it and the runs that test them."""
+
+    operating_set: OperatingSetSettings
+    margin: Setting[float]
+    slopes: Setting[tuple[float, float]]
+    starts: Setting[tuple[Four, Four]]
+    horizon: Setting[float]
+    settle: Setting[float]
+
+    def over(self) -> OperatingSet:
+        """The operating set; an estimated velocity can reach the sliding gain m1 of its design, and no more."""
+        one = self.operating_set
+        reach = (1.0 + self.margin.value) * math.hypot(*one.speed.value)
+        return OperatingSet(one.theta.value, one.speed.value, (reach, reach), one.uncertainty.value)
+
+
+def load_theorem(path: Path) -> TheoremSettings:
+    """Read and validate the settings of ``agents/theorem.py``.
+
+    Raises:
+        ValueError: as :func:`load`.
+    """
+    try:
+        return TheoremSettings.model_validate(_read(path, ()))
+    except ValidationError as error:
+        raise ValueError(f"{path}: " + "; ".join(_explain(e, TheoremSettings) for e in error.errors())) from None
+
+
 def load(path: Path) -> Scenario:
     """Read and validate a scenario; ``extends: FILE`` starts from another file beside it.
 
@@ -199,19 +238,19 @@ def _merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     return {**base, **over, **both}
 
 
-def _explain(error: Any) -> str:
+def _explain(error: Any, kind: type[BaseModel] = Scenario) -> str:
     place = [str(part) for part in error["loc"]]
     if error["type"] == "extra_forbidden":
-        return f"{'.'.join(place)}: {unknown('setting', place[-1], _fields(place[:-1]))}"
+        return f"{'.'.join(place)}: {unknown('setting', place[-1], _fields(place[:-1], kind))}"
     given = "" if error["type"] == "missing" else f" (given {error['input']!r})"
     return f"{'.'.join(place)}: {error['msg']}{given}"
 
 
-def _fields(place: list[str]) -> list[str]:
+def _fields(place: list[str], kind: type[BaseModel]) -> list[str]:
     """The settings that exist at a place of the configuration."""
-    kinds: list[Any] = [Scenario]
+    kinds: list[Any] = [kind]
     for part in place:
-        found = []
+        found: list[Any] = []
         for kind in kinds:
             field = getattr(kind, "model_fields", {}).get(part)
             found += _models(field.annotation) if field is not None else [kind]  # a name or a tag: stay

@@ -1,0 +1,194 @@
+"""Theorem 1 as numbers: its gain conditions, the times it promises, and gains that satisfy it.
+
+The suprema of (28), (30) and (31) run over an operating set that must hold the trajectories of x *and* of xhat, and
+over all plants of an uncertainty level.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .controllers import SlidingModeController
+from .observers import Gains, SlidingModeObserver
+from .plant import CartPendulum
+from .validation import array, number
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class OperatingSet:
+    """All states, estimates and plants that a run may meet.
+
+    Args:
+        theta: bound of |theta| and |thetahat| in rad.
+        speed: bounds of (|h'|, |theta'|) in m/s and rad/s.
+        speed_hat: bounds of the estimates of these; they overshoot while the positions are still being reached.
+        uncertainty: level x of the plants.
+        model: nominal plant.
+
+    Raises:
+        ValueError: a bound is not positive or the level not in [0, 1): the set would hold no point.
+    """
+
+    theta: float
+    speed: tuple[float, float]
+    speed_hat: tuple[float, float]
+    uncertainty: float
+    model: CartPendulum = field(default_factory=CartPendulum)
+
+    def __post_init__(self) -> None:
+        number("theta", self.theta, above=0.0)
+        for name in ("speed", "speed_hat"):
+            if (array(name, getattr(self, name), (2,)) <= 0.0).any():
+                raise ValueError(f"{name}={getattr(self, name)!r} must be positive: the operating set holds no point")
+        if not 0.0 <= number("uncertainty", self.uncertainty) < 1.0:
+            raise ValueError(f"uncertainty={self.uncertainty!r} must be a fraction in [0, 1)")
+
+    def holds(self, x: Array, xhat: Array) -> NDArray[np.bool_]:
+        """Which pairs of states (4, ...) and estimates (4, ...) are inside, (...)."""
+        speed, speed_hat = (np.reshape(bound, (2, *[1] * (x.ndim - 1))) for bound in (self.speed, self.speed_hat))
+        angles = (np.abs(x[1]) <= self.theta) & (np.abs(xhat[1]) <= self.theta)
+        return np.asarray(angles & (np.abs(x[2:]) <= speed).all(axis=0) & (np.abs(xhat[2:]) <= speed_hat).all(axis=0))
+
+
+@dataclass(frozen=True, slots=True)
+class Suprema:
+    """Right-hand sides of the conditions, one entry a row (h, theta)."""
+
+    speed: Array
+    """sup |X2|, of (28)."""
+    drift: Array
+    """sup |f20(x) - f20(xhat) + f2Delta(x)|, of (30)."""
+    gain: Array
+    """sup |g20(x) - g20(xhat) + g2Delta(x)|, of (31)."""
+
+
+def suprema(over: OperatingSet) -> Suprema:
+    """The suprema over an operating set, where x, xhat and the plant vary independently.
+
+    f2 and g2 are affine in theta'^2 and, one at a time, monotone in M_c, m and l (each is a Moebius function of them),
+    so extremes lie at the corners of those; theta is scanned.
+    """
+    theta = np.linspace(-over.theta, over.theta, 4001)
+    scales = (1.0 - over.uncertainty, 1.0 + over.uncertainty)
+    plants = [over.model.perturbed(np.array(corner) - 1.0) for corner in itertools.product(scales, repeat=3)]
+
+    def extremes(plants: list[CartPendulum], fastest: float) -> tuple[Array, Array, Array, Array]:
+        drifts, gains = [], []
+        for plant in plants:
+            for omega in (0.0, fastest):
+                x = np.array([np.zeros_like(theta), theta, np.zeros_like(theta), np.full_like(theta, omega)])
+                drifts.append(plant.drift(x)[2:])
+                gains.append(plant.gain(x)[2:])
+        f, g = np.concatenate(drifts, axis=1), np.concatenate(gains, axis=1)
+        return f.min(axis=1), f.max(axis=1), g.min(axis=1), g.max(axis=1)
+
+    f_low, f_high, g_low, g_high = extremes(plants, over.speed[1])
+    fhat_low, fhat_high, ghat_low, ghat_high = extremes([over.model], over.speed_hat[1])
+    return Suprema(
+        speed=np.array(over.speed),
+        drift=np.maximum(f_high - fhat_low, fhat_high - f_low),
+        gain=np.maximum(g_high - ghat_low, ghat_high - g_low),
+    )
+
+
+def suprema_along(x: Array, xhat: Array, plant: CartPendulum, model: CartPendulum | None = None) -> Suprema:
+    """The suprema along one measured trajectory, states and estimates (4, m)."""
+    model = model or CartPendulum()
+    return Suprema(
+        speed=np.abs(x[2:]).max(axis=1),
+        drift=np.abs(plant.drift(x) - model.drift(xhat))[2:].max(axis=1),
+        gain=np.abs(plant.gain(x) - model.gain(xhat))[2:].max(axis=1),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """One inequality ``gain > supremum``, row by row and read literally."""
+
+    name: str
+    gain: Array
+    supremum: Array
+
+    @property
+    def by_row(self) -> NDArray[np.bool_]:
+        """Whether each row's own gain exceeds its own supremum."""
+        return np.asarray(self.gain > self.supremum)
+
+    @property
+    def literal(self) -> bool:
+        """As printed: the smaller gain against the norm over rows (Euclidean in (28), infinity in (30) and (31))."""
+        norm = np.linalg.norm(self.supremum) if self.name == "(28)" else self.supremum.max()
+        return bool(self.gain.min() > norm)
+
+
+def conditions(gains: Gains, bounds: Suprema) -> list[Condition]:
+    """(28), (30) and (31) for some gains."""
+    return [
+        Condition("(28)", np.array(gains.m1), bounds.speed),
+        Condition("(30)", np.array(gains.beta_1), bounds.drift),
+        Condition("(31)", np.array(gains.beta_2), bounds.gain),
+    ]
+
+
+def design(over: OperatingSet, margin: float = 0.1) -> Gains:
+    """The smallest gains that exceed the suprema of an operating set, read literally, by a margin.
+
+    Args:
+        over: the operating set.
+        margin: how much more than necessary, as a fraction.
+
+    Raises:
+        ValueError: the margin is not positive.
+    """
+    more = 1.0 + number("margin", margin, above=0.0)
+    bounds = suprema(over)
+    m1, drift, gain = (more * float(v) for v in (np.linalg.norm(bounds.speed), bounds.drift.max(), bounds.gain.max()))
+    return Gains(m1=(m1, m1), beta_1=(drift, drift), beta_2=(gain, gain))
+
+
+def stable(gains: Gains, slopes: tuple[float, float], dt: float, force: float) -> SlidingModeObserver:
+    """An observer with these gains and the longest step that divides the sampling period and is stable (RK4)."""
+    observer = SlidingModeObserver(gains=gains, slopes=slopes)
+    return SlidingModeObserver(gains=gains, slopes=slopes, step=dt / math.ceil(dt / observer.largest_step(force)))
+
+
+def layer(speed: ArrayLike, m1: ArrayLike, slope: float) -> Array:
+    """Half-width of the boundary layer of the positions, atanh(|X2| / m1) / k_p, where m1 tanh(k_p e) = |X2|.
+
+    Infinite where ``m1 <= |X2|``.
+    """
+    ratio = np.minimum(np.abs(np.asarray(speed)) / np.asarray(m1), 1.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.arctanh(ratio) / slope)
+
+
+def reaching_time(error: ArrayLike, gain: ArrayLike, supremum: ArrayLike) -> Array:
+    """The time of (43), ``|e(0)| / kappa`` with ``kappa = gain - supremum``; of (48) likewise, from t0 on.
+
+    Infinite where the gain does not exceed the supremum.
+    """
+    kappa = np.asarray(gain) - np.asarray(supremum)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.where(kappa > 0.0, np.abs(error) / np.maximum(kappa, 0.0), np.inf))
+
+
+def controllability(law: SlidingModeController, xhat: Array, model: CartPendulum | None = None) -> tuple[Array, Array]:
+    """Both sides of (52) along estimates (4, m): ``|ds/dx g| Z0`` and ``|ds/dx f| + lambda``.
+
+    (51) asks the first not to be 0.
+
+    s of (50) is a sum of squares: its gradient vanishes with it, so that near s = 0 the first cannot exceed lambda.
+    """
+    model = model or CartPendulum()
+    k1, k2, k3, k4 = law.k
+    cart, rod = k1 * xhat[0] + k3 * xhat[2], k2 * xhat[1] + k4 * xhat[3]
+    gradient = np.array([k1 * cart, k2 * rod, k3 * cart, k4 * rod])
+    push = np.abs((gradient * model.gain(xhat)).sum(axis=0)) * law.Z0
+    return push, np.abs((gradient * model.drift(xhat)).sum(axis=0)) + law.lam

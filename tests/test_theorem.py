@@ -1,0 +1,143 @@
+"""Theorem 1 as numbers: suprema against random search, times and layers against cases worked out by hand."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from smo_gym import LQR, CartPendulum, Gains, SlidingModeController, theorem
+from smo_gym.evaluation.convergence import converge
+from smo_gym.theorem import OperatingSet
+
+SET = OperatingSet(theta=0.7, speed=(1.7, 5.2), speed_hat=(6.0, 6.0), uncertainty=0.2)
+ROOT = Path(__file__).resolve().parent.parent
+
+
+def test_no_random_point_exceeds_the_suprema_and_some_come_near():
+    rng = np.random.default_rng(0)
+    bounds = theorem.suprema(SET)
+    n = 20_000
+    x = rng.uniform(-1, 1, (4, n)) * np.array([[1.0], [0.7], [1.7], [5.2]])
+    xhat = rng.uniform(-1, 1, (4, n)) * np.array([[1.0], [0.7], [6.0], [6.0]])
+    largest = np.zeros((2, 2))
+    model = CartPendulum()
+    for corner in np.concatenate(
+        [rng.uniform(-0.2, 0.2, (100, 3)), 0.2 * np.array(np.meshgrid(*[[-1, 1]] * 3)).reshape(3, 8).T]
+    ):
+        plant = model.perturbed(corner)
+        drift = np.abs(plant.drift(x) - model.drift(xhat))[2:].max(axis=1)
+        gain = np.abs(plant.gain(x) - model.gain(xhat))[2:].max(axis=1)
+        largest = np.maximum(largest, [drift, gain])
+    assert (largest <= [bounds.drift, bounds.gain]).all()
+    assert (largest >= 0.85 * np.array([bounds.drift, bounds.gain])).all()
+
+
+def test_along_a_trajectory_the_suprema_are_those_of_its_points():
+    rng = np.random.default_rng(0)
+    x, xhat, plant = rng.normal(size=(4, 9)), rng.normal(size=(4, 9)), CartPendulum().perturbed([0.1, 0.1, -0.1])
+    along = theorem.suprema_along(x, xhat, plant)
+    differences = [np.abs(plant.drift(a) - CartPendulum().drift(b))[2:] for a, b in zip(x.T, xhat.T, strict=True)]
+    np.testing.assert_allclose(along.drift, np.max(differences, axis=0))
+    np.testing.assert_allclose(along.speed, np.abs(x[2:]).max(axis=1))
+
+
+def test_designed_gains_satisfy_the_conditions_and_the_printed_ones_do_not():
+    bounds = theorem.suprema(SET)
+    designed = theorem.conditions(theorem.design(SET), bounds)
+    assert [one.name for one in designed] == ["(28)", "(30)", "(31)"]
+    assert all(one.literal and one.by_row.all() for one in designed)
+    assert not any(one.literal for column in ("lqr", "smc") for one in theorem.conditions(Gains.of(column), bounds))
+    barely = theorem.conditions(theorem.design(SET, margin=1e-9), bounds)
+    assert all(one.literal for one in barely)
+
+
+def test_the_stable_step_is_the_longest_that_divides_the_sampling_period():
+    observer = theorem.stable(theorem.design(SET), (200.0, 100.0), 0.001, 30.0)
+    parts = round(0.001 / observer.step)
+    assert observer.step <= observer.largest_step(30.0) < 0.001 / (parts - 1)
+    observer.start(1, 0.001, 30.0, CartPendulum())
+
+
+def test_layers_and_times():
+    assert theorem.layer([1.0], 2.0, 10.0)[0] == pytest.approx(math.atanh(0.5) / 10.0)
+    assert theorem.layer([3.0], 2.0, 10.0)[0] == math.inf
+    assert theorem.reaching_time([-0.6], [3.0], [1.0])[0] == pytest.approx(0.3)
+    assert theorem.reaching_time([0.6], [1.0], [1.0])[0] == math.inf
+
+
+def test_condition_52_fails_where_s_vanishes():
+    law = SlidingModeController((1.4, 3.4, 3.3, 0.8), 0.001, 33.3)
+    rng = np.random.default_rng(0)
+    xhat = rng.normal(size=(4, 50))
+    push, needed = theorem.controllability(law, xhat)
+
+    def s(x):
+        return 0.5 * (1.4 * x[0] + 3.3 * x[2]) ** 2 + 0.5 * (3.4 * x[1] + 0.8 * x[3]) ** 2
+
+    step = 1e-6
+    model = CartPendulum()
+    along_g = (s(xhat + step * model.gain(xhat)) - s(xhat - step * model.gain(xhat))) / (2 * step)
+    along_f = (s(xhat + step * model.drift(xhat)) - s(xhat - step * model.drift(xhat))) / (2 * step)
+    np.testing.assert_allclose(push, 26.0 * np.abs(along_g), rtol=1e-6)
+    np.testing.assert_allclose(needed, np.abs(along_f) + 30.0, rtol=1e-6)
+    push, needed = theorem.controllability(law, np.zeros((4, 1)))
+    assert push[0] == 0.0
+    assert needed[0] == 30.0
+
+
+def test_errors_are_in_their_layers_when_the_theorem_says_so():
+    rng = np.random.default_rng(0)
+    n = 40
+    starts = rng.uniform([-0.5, -0.5, -0.1, -0.1], [0.5, 0.5, 0.1, 0.1], (n, 4))
+    plants = np.array([CartPendulum().draw(0.2, rng).as_array() for _ in range(n)])
+    observers = {
+        "designed": theorem.stable(theorem.design(SET), (200.0, 100.0), 0.001, 30.0),
+        "sluggish": theorem.stable(Gains((2.0, 2.0), (0.1, 0.1), (1.0, 0.5)), (12.5, 12.5), 0.001, 30.0),
+    }
+    agent = LQR([7.197, -4.026, 10.96, -0.9999])
+    found = converge(observers, agent, SET, starts, plants, horizon=3.0, settle=1.5)
+    assert found.stayed.mean() > 0.9
+    assert (found.reached <= found.promised)[:, found.stayed].all()
+    assert (found.promised < 1.0).all()
+    assert (found.velocity_rms["designed"] < 0.2 * found.velocity_rms["sluggish"]).all()
+    # and the check can fail: gains that break (28) do not keep what a smaller set would let them promise
+    slow = {"sluggish": observers["sluggish"]}
+    tight = OperatingSet(theta=0.7, speed=(1.0, 1.0), speed_hat=(6.0, 6.0), uncertainty=0.2)
+    failing = converge(slow, agent, tight, starts, plants, horizon=3.0, settle=1.5)
+    assert not failing.stayed.all()
+    assert not (failing.reached <= failing.promised).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"theta": 0.0}, "theta=0.0 must be a finite number greater than 0"),
+        ({"speed": (0.0, 1.0)}, "the operating set holds no point"),
+        ({"speed_hat": (1.0,)}, r"speed_hat has shape \(1,\)"),
+        ({"uncertainty": 1.0}, r"uncertainty=1\.0 must be a fraction in \[0, 1\)"),
+    ],
+)
+def test_bad_sets_are_named(change, message):
+    with pytest.raises(ValueError, match=message):
+        OperatingSet(**{"theta": 0.7, "speed": (1.0, 1.0), "speed_hat": (1.0, 1.0), "uncertainty": 0.1} | change)
+
+
+def test_margins_are_positive():
+    with pytest.raises(ValueError, match=r"margin=0\.0 must be a finite number greater than 0"):
+        theorem.design(SET, 0.0)
+
+
+def test_the_command(tmp_path):
+    command = [sys.executable, str(ROOT / "agents" / "theorem.py"), "--runs", "30"]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert "30 of 30 were inside the layer of both positions by the time of (43)" in text
+    assert "(52) holds for" in text
+    (tmp_path / "bad.yaml").write_text((ROOT / "configs" / "theorem.yaml").read_text().replace("margin:", "margn:"))
+    bad = subprocess.run(
+        [*command, "--config", str(tmp_path / "bad.yaml")], capture_output=True, text=True, check=False
+    )
+    assert bad.returncode == 2
+    assert "did you mean 'margin'?" in bad.stderr
