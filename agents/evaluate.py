@@ -26,6 +26,7 @@ CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
 ARMS: dict[str, dict[str, tuple[str, ...]]] = {
     "smo": {"on": ("with",), "off": ("without",), "both": ("without", "with")},
+    "theorem": {"on": ("theorem",), "off": ("theorem",), "both": ("theorem",)},
     "oracle": {"on": ("oracle",), "off": ("oracle",), "both": ("oracle",)},
 }
 
@@ -55,9 +56,9 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
     add(
         "--observer",
-        type=one_of("observer", ("smo", "oracle", "all")),
+        type=one_of("observer", (*ARMS, "all")),
         default="smo",
-        help="smo (default), oracle or all",
+        help="smo (default), theorem (gains that satisfy it), oracle (the true state) or all",
     )
     add(
         "--compensation",
@@ -136,13 +137,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         scenarios = load(args)
         controllers = chosen(scenarios, args.controller)
+        observers = tuple(ARMS) if args.observer == "all" else (args.observer,)
+        arms = [arm for observer in observers for arm in ARMS[observer][args.compensation]]
+        groups = study.groups(scenarios, controllers, arms, args.runs)
         out = files.prepare(args.out)
     except ValueError as error:
         print(f"evaluate.py: error: {error}", file=sys.stderr)
         return 2
-    observers = tuple(ARMS) if args.observer == "all" else (args.observer,)
-    arms = [arm for observer in observers for arm in ARMS[observer][args.compensation]]
-    groups = study.groups(scenarios, controllers, arms, args.runs)
     runs = sum(group.runs for group in groups)
     try:
         print(f"{runs} runs to do", file=sys.stderr, flush=True)

@@ -42,14 +42,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         settings = scenario.load_theorem(args.config)
         if args.runs < 1 or args.seed < 0:
             raise ValueError(f"--runs {args.runs} must be at least 1 and --seed {args.seed} at least 0")
-        over = settings.over()
-        designed = theorem.design(over, settings.margin.value)
-        observer = theorem.stable(designed, settings.slopes.value, DT, force=30.0)
+        over = settings.over(CartPendulum())
+        observer = settings.build(DT, over.model)
     except ValueError as error:
         print(f"theorem.py: error: {error}", file=sys.stderr)
         return 2
     article = scenario.load(CONFIGS / "initial-conditions.yaml")
-    gain_conditions({"printed, LQR": Gains.of("lqr"), "printed, SMC": Gains.of("smc"), "designed": designed}, over)
+    gains = {"printed, LQR": Gains.of("lqr"), "printed, SMC": Gains.of("smc"), "designed": Gains.of(observer.gains)}
+    gain_conditions(gains, over)
     print(
         f"\nThe designed observer wants a step of {1e3 * (observer.step or DT):.3g} ms with slopes {observer.slopes}.\n"
     )

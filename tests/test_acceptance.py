@@ -58,5 +58,14 @@ def test_table_4_averages_and_reductions(rows, controller):
     assert all(abs(float(row["measured"]) - float(row["published"])) <= 5.0 for row in reductions)
 
 
+def test_table_7_averages_and_reductions(rows):
+    averages = deviations(select(rows, "7", "smc-tracking", "mse", average=True))
+    assert averages.size == 4
+    assert np.abs(np.expm1(averages)).max() <= 0.12
+    reductions = select(rows, "7", "smc-tracking", "mse_reduction_percent", average=True)
+    assert len(reductions) == 2
+    assert all(abs(float(row["measured"]) - float(row["published"])) <= 5.0 for row in reductions)
+
+
 def test_no_run_fails(rows):
     assert all(row["failures"] == "0" for row in rows)

@@ -1,6 +1,7 @@
 """The command line, as a user calls it."""
 
 import csv
+import json
 import os
 import subprocess
 import sys
@@ -126,7 +127,7 @@ def test_options_choose_arms_levels_and_files(tmp_path):
     assert {row["uncertainty_percent"] for row in rows if row["case"] == "1"} == {"0", "10", "20"}
     assert "No published cell to compare with" in done.stdout
     evaluate("--config", config, *options, "--compensation", "on", "--observer", "all", "--out", tmp_path / "b")
-    assert {row["compensation"] for row in read(tmp_path / "b" / "results.csv")} == {"oracle", "with"}
+    assert {row["compensation"] for row in read(tmp_path / "b" / "results.csv")} == {"oracle", "theorem", "with"}
 
 
 def test_failed_runs_are_shown(tmp_path):
@@ -141,6 +142,55 @@ def test_failed_runs_are_shown(tmp_path):
     assert all(row["failures"] == "0" and row["measured"] for row in case_2)
     assert "3 of 3" in done.stdout
     assert "16 of 32 runs failed" in done.stdout
+
+
+def test_the_theorems_gains_are_an_arm_of_their_own(tmp_path):
+    config = small_scenario(tmp_path, horizon={"value": 2.0, "source": "chosen"})
+    options = ("--config", config, "--controller", "lqr", "--runs", "2", "--compensation", "on")
+    evaluate(*options, "--observer", "all", "--out", tmp_path / "out")
+    runs = [run for run in read(tmp_path / "out" / "runs.csv") if run["uncertainty"] != "0.0"]
+    error = {
+        arm: sum(float(run["estimation_rms_h"]) for run in runs if run["arm"] == arm)
+        for arm in ("with", "theorem", "oracle")
+    }
+    assert error["oracle"] == 0.0
+    assert 0.0 < error["theorem"] < 0.5 * error["with"]
+    without = small_scenario(tmp_path, designed=None)
+    done = evaluate("--config", without, "--observer", "theorem", check=False, cwd=tmp_path)
+    assert done.returncode == 2
+    assert "has no setting 'designed'" in done.stderr
+
+
+def test_falls_of_the_upright_plant_are_counted(tmp_path):
+    config = yaml.safe_load((ROOT / "configs" / "upright.yaml").read_text())
+    config["horizon"]["value"] = 3.0
+    config["uncertainty"]["value"] = [0.2]
+    config["initial_states"]["value"] = {"near": [0.0, 0.05, 0.0, 0.0], "far": [0.0, 1.2, 0.0, 0.0]}
+    (tmp_path / "upright.yaml").write_text(yaml.safe_dump(config))
+    command = [sys.executable, str(ROOT / "agents" / "upright.py"), "--config", str(tmp_path / "upright.yaml")]
+    lines = subprocess.run([*command, "--runs", "20"], check=True, capture_output=True, text=True).stdout.splitlines()
+    near, far = (next(line for line in lines if line.startswith(case)) for case in ("near", "far"))
+    assert near.count("0.0 [0.0, 16.1]") == 4
+    assert far.count("100.0 [83.9, 100.0]") >= 2
+
+
+def test_the_article_is_checked_against_itself():
+    command = [sys.executable, str(ROOT / "agents" / "consistency.py")]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert "133 of 138 printed numbers follow from the printed cells." in text
+
+
+def test_the_shipped_reference_is_what_its_command_computes(tmp_path):
+    pytest.importorskip("casadi")
+    command = [sys.executable, str(ROOT / "agents" / "reference.py"), "--out", str(tmp_path / "reference.json")]
+    subprocess.run(command, check=True, capture_output=True)
+    ours = json.loads((ROOT / "smo_gym" / "article" / "reference.json").read_text())
+    again = json.loads((tmp_path / "reference.json").read_text())
+    assert again["cost"] == pytest.approx(ours["cost"], rel=1e-9)
+    assert again["u"] == pytest.approx(ours["u"], abs=1e-5)
+    bad = subprocess.run([*command, "--horizon", "0.2"], check=False, capture_output=True, text=True)
+    assert bad.returncode == 2
+    assert "IPOPT says" in bad.stderr
 
 
 @pytest.mark.parametrize(

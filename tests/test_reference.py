@@ -108,14 +108,14 @@ def test_the_observation_tells_the_reference_now_and_ahead():
 
 
 def test_after_the_reference_there_is_rest():
-    env = gymnasium.make("SMOPendulumTracking-v0", horizon=9.0)
+    env = gymnasium.make("SMOPendulumTracking-v0", horizon=11.0)
     observation, _ = env.reset(seed=0)
     truncated = False
     steps = 0
     while not truncated:
         observation, _, _, truncated, _ = env.step(np.zeros(1))
         steps += 1
-    assert steps == 450
+    assert steps == 550
     assert (observation[2:] == 0.0).all()
 
 

@@ -21,8 +21,13 @@ def prepare(folder: Path) -> Path:
 
 
 def write(path: Path, text: str) -> None:
-    """Write a file as a whole: whoever looks finds the old one or the new one."""
-    with tempfile.NamedTemporaryFile("w", encoding="utf-8", dir=path.parent, delete=False) as file:
-        file.write(text)
+    """Write a text file as a whole: whoever looks finds the old one or the new one."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """The same of any file."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(data)
     os.chmod(file.name, 0o644)
     os.replace(file.name, path)

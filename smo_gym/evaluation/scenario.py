@@ -12,8 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ..controllers import LQR, SlidingModeController
 from ..observers import SlidingModeObserver
+from ..plant import CartPendulum
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
-from ..theorem import OperatingSet
+from ..theorem import OperatingSet, design, stable
 from ..validation import unknown
 from ..wrappers import VectorObserverWrapper
 
@@ -88,6 +89,40 @@ class SmcSettings(_Strict):
 ControllerSettings = Annotated[LqrSettings | SmcSettings, Field(discriminator="law")]
 
 
+class OperatingSetSettings(_Strict):
+    """Bounds of states and estimates, and the level of uncertainty."""
+
+    theta: Setting[float]
+    speed: Setting[tuple[float, float]]
+    uncertainty: Setting[Fraction]
+
+
+class DesignSettings(_Strict):
+    """An observer whose gains satisfy (28), (30) and (31) over an operating set."""
+
+    operating_set: OperatingSetSettings
+    margin: Setting[float]
+    slopes: Setting[tuple[float, float]]
+
+    def over(self, model: CartPendulum) -> OperatingSet:
+        """The operating set; an estimated velocity can reach the sliding gain m1 of its design, and no more."""
+        one = self.operating_set
+        reach = (1.0 + self.margin.value) * math.hypot(*one.speed.value)
+        return OperatingSet(one.theta.value, one.speed.value, (reach, reach), one.uncertainty.value, model)
+
+    def build(self, dt: float, model: CartPendulum) -> SlidingModeObserver:
+        """The observer, with a step that it is stable at for forces up to 30 N."""
+        return stable(design(self.over(model), self.margin.value), self.slopes.value, dt, force=30.0)
+
+
+class TheoremSettings(DesignSettings):
+    """The runs that test a design: ``agents/theorem.py``."""
+
+    starts: Setting[tuple[Four, Four]]
+    horizon: Setting[float]
+    settle: Setting[float]
+
+
 class ReferenceSettings(_Strict):
     """The minimum-energy reference of a tracking scenario, from its initial state, over its horizon."""
 
@@ -113,6 +148,7 @@ class Scenario(_Strict):
     uncertainty: Setting[Annotated[tuple[Fraction, ...], Field(min_length=1)]]
     initial_states: Setting[Annotated[dict[str, Four], Field(min_length=1)]]
     controllers: Annotated[dict[str, ControllerSettings], Field(min_length=1)]
+    designed: DesignSettings | None = None
     reference: ReferenceSettings | None = None
 
     def trajectory(self) -> Reference | None:
@@ -143,31 +179,6 @@ class Scenario(_Strict):
             "force_limit": self.force_limit.value,
             "track_limit": self.track_limit.value,
         }
-
-
-class OperatingSetSettings(_Strict):
-    """Bounds of states and estimates, and the level of uncertainty."""
-
-    theta: Setting[float]
-    speed: Setting[tuple[float, float]]
-    uncertainty: Setting[Fraction]
-
-
-class TheoremSettings(_Strict):
-    """An operating set, gains designed for it and the runs that test them."""
-
-    operating_set: OperatingSetSettings
-    margin: Setting[float]
-    slopes: Setting[tuple[float, float]]
-    starts: Setting[tuple[Four, Four]]
-    horizon: Setting[float]
-    settle: Setting[float]
-
-    def over(self) -> OperatingSet:
-        """The operating set; an estimated velocity can reach the sliding gain m1 of its design, and no more."""
-        one = self.operating_set
-        reach = (1.0 + self.margin.value) * math.hypot(*one.speed.value)
-        return OperatingSet(one.theta.value, one.speed.value, (reach, reach), one.uncertainty.value)
 
 
 def load_theorem(path: Path) -> TheoremSettings:
@@ -207,6 +218,9 @@ def _try(scenario: Scenario) -> None:
     for settings in scenario.controllers.values():
         settings.build(scenario.control_period.value)
         VectorObserverWrapper(env, settings.observer.build(True))
+    if scenario.designed is not None:
+        model: CartPendulum = env.unwrapped.task.params  # type: ignore[attr-defined]
+        VectorObserverWrapper(env, scenario.designed.build(scenario.control_period.value, model))
 
 
 def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:

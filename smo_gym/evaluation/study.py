@@ -17,8 +17,8 @@ from .rollout import rollout
 from .scenario import ControllerSettings, Scenario
 
 Array = NDArray[np.float64]
-ARMS = ("without", "with", "oracle")
-"""Compensation of the input uncertainty off, on; and the true state in place of an estimate."""
+ARMS = ("without", "with", "theorem", "oracle")
+"""Compensation of the input uncertainty off, on; gains that satisfy the theorem; the true state for an estimate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,15 @@ class Outcome:
 
 
 def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequence[str], runs: int) -> list[Group]:
-    """All groups of some scenarios, with the nominal plant (0 %, one run) beside the scenarios' own levels."""
+    """All groups of some scenarios, with the nominal plant (0 %, one run) beside the scenarios' own levels.
+
+    Raises:
+        ValueError: an arm of designed gains is wanted of a scenario that says nothing of them.
+    """
+    scenarios = list(scenarios)
+    for scenario in scenarios:
+        if "theorem" in arms and scenario.designed is None:
+            raise ValueError(f"scenario {scenario.title!r} has no setting 'designed' for the theorem's gains")
     return [
         Group(scenario, controller, level, case, arm, runs if level > 0.0 else 1)
         for scenario in scenarios
@@ -89,7 +97,7 @@ def measure(
     batches: dict[Any, list[int]] = {}
     for index, group in enumerate(wanted):
         scenario = group.scenario
-        key = (scenario.environment, repr(options[scenario.title]), repr(group.settings), group.arm == "oracle")
+        key = (scenario.environment, repr(options[scenario.title]), repr(group.settings), _together(group.arm))
         batches.setdefault(key, []).append(index)
     outcomes: dict[int, Outcome] = {}
     for indices in batches.values():
@@ -97,6 +105,11 @@ def measure(
         found = _run(batch, options[batch[0].scenario.title], seed, progress)
         outcomes.update(zip(indices, found, strict=True))
     return [outcomes[index] for index in range(len(wanted))]
+
+
+def _together(arm: str) -> str:
+    """Arms that can share a batch: their observers have one step."""
+    return "smo" if arm in ("without", "with") else arm
 
 
 def simulated_seconds(wanted: Iterable[Group]) -> float:
@@ -114,15 +127,19 @@ def _run(
     )
     nominal: CartPendulum = env.unwrapped.task.params  # type: ignore[attr-defined]
     draws = deviations(seed, max(group.runs for group in batch))
+    dt = scenario.control_period.value
     states, plants, observers = [], [], []
     for group in batch:
-        observer = settings.observer.build(group.arm == "with")
+        if group.arm == "theorem":
+            assert scenario.designed is not None  # groups() has seen to it
+            observer = scenario.designed.build(dt, nominal)
+        else:
+            observer = settings.observer.build(group.arm == "with")
         for draw in draws[: group.runs]:
             states.append(group.scenario.initial_states.value[group.case])
             plants.append(nominal.perturbed(group.uncertainty * draw).as_array())
             observers.append(observer)
     observed = VectorObserverWrapper(env, "oracle" if batch[0].arm == "oracle" else observers)
-    dt = scenario.control_period.value
     result = rollout(
         observed,
         settings.build(dt),
