@@ -41,7 +41,8 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add(
         "--scenario",
         type=one_of("scenario", (*SCENARIOS, "all")),
-        default="all",
+        nargs="+",
+        default=["all"],
         help="regulation (Table 4), initial-conditions (Table 5), tracking (Table 7) or all (default)",
     )
     add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
@@ -107,7 +108,7 @@ def fraction(text: str) -> float:
 
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
     """The chosen scenarios, with the levels of the command line."""
-    names = SCENARIOS if arguments.scenario == "all" else (arguments.scenario,)
+    names = SCENARIOS if "all" in arguments.scenario else dict.fromkeys(arguments.scenario)
     paths = [arguments.config] if arguments.config else [CONFIGS / f"{name}.yaml" for name in names]
     found = [scenario.load(path) for path in paths]
     if arguments.uncertainty is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..reference import Reference
 from ..validation import multiple
 from .task import Task
 
@@ -12,27 +13,22 @@ Array = NDArray[np.float64]
 
 
 class Desired:
-    """The desired states of a task: zero, or a reference and then rest at its end.
+    """A task's reference, and then rest at its end.
 
     Attributes:
         states: x_d at each control instant, (steps + 1, 4).
         positions: [h_d, theta_d] at the sampling instants of the control period that ends at each control instant,
             (steps + 1, substeps, 2).
         told: what the observation holds of it, x_d now and at the next ``preview`` control instants,
-            (steps + 1, 4 (1 + preview)); (steps + 1, 0) without a reference.
+            (steps + 1, 4 (1 + preview)).
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, reference: Reference) -> None:
         n = task.substeps
-        if task.reference is None:
-            self.states = np.zeros((task.steps + 1, 4))
-            self.positions = np.zeros((task.steps + 1, n, 2))
-            self.told = np.zeros((task.steps + 1, 0))
-            return
-        multiple("reference horizon", task.reference.horizon, "dt", task.dt)
-        x_d = task.reference.trajectory(task.dt).T
+        multiple("reference horizon", reference.horizon, "dt", task.dt)
+        x_d = reference.trajectory(task.dt).T
         needed = (task.steps + task.preview) * n + 1
-        rest = np.repeat([task.reference.xT], max(needed - len(x_d), 0), axis=0)
+        rest = np.repeat([reference.xT], max(needed - len(x_d), 0), axis=0)
         x_d = np.concatenate([x_d, rest])
         ahead = x_d[:needed:n]
         self.states = ahead[: task.steps + 1]

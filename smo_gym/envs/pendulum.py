@@ -15,6 +15,7 @@ from .task import HANGING, TRACKING, UPRIGHT, Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
 RESET_OPTIONS = ("state", "params")
+_REST = np.zeros((1, 4))
 
 
 class PendulumEnv(gymnasium.Env[Array, Array]):
@@ -68,7 +69,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
 
     At every step, with the same keys: `state` (4,) and `params` [M_c, m, l, g] (4,), the truth; `force`, what the
     actuator applied; `samples` (substeps, 2), the encoders at each sampling instant of the control period just run;
-    `desired` (substeps, 2), where h and theta should have been then.
+    with a reference also `desired` (substeps, 2), where h and theta should have been then.
 
     ## Arguments
 
@@ -106,7 +107,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         self.observation_space = self.task.observation_space
         self.action_space = self.task.action_space
         self._stepper = Stepper(self.task)
-        self._desired = Desired(self.task)
+        self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._steps_left = 0
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
@@ -131,7 +132,8 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         u = applied_force([action], 1, self.task.force_limit)
         self._steps_left -= 1
         k = self.task.steps - self._steps_left
-        samples, reward, failed = self._stepper.step(self._x, self._params, u, self._desired.states[k : k + 1])
+        x_d = _REST if self._desired is None else self._desired.states[k : k + 1]
+        samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
         terminated = bool(failed[0])
         truncated = self._steps_left == 0 and not terminated
         if terminated:
@@ -140,16 +142,19 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         return self._observation(k), float(reward[0]), terminated, truncated, info
 
     def _observation(self, k: int) -> Array:
-        return np.concatenate([self._x[:2, 0], self._desired.told[k]])
+        y = self._x[:2, 0]
+        return y.copy() if self._desired is None else np.concatenate([y, self._desired.told[k]])
 
     def _info(self, samples: Array, force: float, k: int) -> dict[str, Any]:
-        return {
+        info = {
             "state": self._x[:, 0].copy(),
             "params": self._params[:, 0].copy(),
             "force": force,
             "samples": samples,
-            "desired": self._desired.positions[k].copy(),
         }
+        if self._desired is not None:
+            info["desired"] = self._desired.positions[k].copy()
+        return info
 
 
 class UprightEnv(PendulumEnv):

@@ -64,7 +64,8 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._stepper = Stepper(self.task)
-        self._desired = Desired(self.task)
+        self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
+        self._rest = np.zeros((num_envs, 4))
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._x = np.zeros((4, num_envs))
@@ -120,7 +121,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             held = self._x[:, over]
             u[over] = 0.0
         self._steps_left -= 1
-        x_d = self._desired.states[self._k()]
+        x_d = self._rest if self._desired is None else self._desired.states[self._k()]
         samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
         terminated, truncated = failed, (self._steps_left == 0) & ~failed
         if waiting:
@@ -199,6 +200,8 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         return np.repeat(self._x[None, :2], self._stepper.substeps, axis=0)
 
     def _observation(self) -> Array:
+        if self._desired is None:
+            return self._x[:2].T.copy()
         told = self._desired.told[self._k()]
         observation = np.empty((self.num_envs, 2 + told.shape[1]))
         observation[:, :2] = self._x[:2].T
@@ -211,7 +214,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
         everywhere = self._everywhere
-        return {
+        info = {
             "state": self._x.T.copy(),
             "_state": everywhere,
             "params": self._params_told,
@@ -220,9 +223,10 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             "_force": everywhere,
             "samples": samples.transpose(2, 0, 1),
             "_samples": everywhere,
-            "desired": self._desired.positions[self._k()],
-            "_desired": everywhere,
         }
+        if self._desired is not None:
+            info |= {"desired": self._desired.positions[self._k()], "_desired": everywhere}
+        return info
 
 
 def _only(values: Array, slots: Flags) -> Array:

@@ -33,7 +33,8 @@ def start(n: int) -> Array:
 
 def add(sums: Array, info: dict[str, Any], xhat: Array, over: NDArray[np.bool_]) -> None:
     """Add one control period, which ended with the estimates ``xhat`` (n, 4), to all runs that are not over yet."""
-    _add(sums, info["samples"], info["desired"], info["state"], xhat, info["force"], over)
+    deviation = info["samples"] - info["desired"] if "desired" in info else info["samples"]
+    _add(sums, deviation, info["state"], xhat, info["force"], over)
 
 
 def finish(sums: Array, control_period: float) -> dict[str, Array]:
@@ -50,12 +51,12 @@ def finish(sums: Array, control_period: float) -> dict[str, Array]:
 
 
 @kernel
-def _add(sums: Array, samples: Array, desired: Array, x: Array, xhat: Array, u: Array, over: NDArray[np.bool_]) -> None:
+def _add(sums: Array, deviation: Array, x: Array, xhat: Array, u: Array, over: NDArray[np.bool_]) -> None:
     for i in range(len(u)):
         if over[i]:
             continue
-        for k in range(samples.shape[1]):
-            h, theta = samples[i, k, 0] - desired[i, k, 0], samples[i, k, 1] - desired[i, k, 1]
+        for k in range(deviation.shape[1]):
+            h, theta = deviation[i, k, 0], deviation[i, k, 1]
             sums[0, i] += h * h
             sums[1, i] += theta * theta
             sums[8, i] = max(sums[8, i], abs(h))
@@ -67,5 +68,5 @@ def _add(sums: Array, samples: Array, desired: Array, x: Array, xhat: Array, u: 
         sums[7, i] += abs(u[i] - sums[_PREVIOUS_FORCE, i])
         sums[10, i] = max(sums[10, i], abs(u[i]))
         sums[_PREVIOUS_FORCE, i] = u[i]
-        sums[_SAMPLES, i] += samples.shape[1]
+        sums[_SAMPLES, i] += deviation.shape[1]
         sums[_PERIODS, i] += 1.0

@@ -18,7 +18,7 @@ from . import inlined
 
 LANES = 64
 # Below this many microseconds of work for one core, waking a second thread costs more than it saves.
-_WORTH_A_THREAD = 150.0
+_WORTH_A_THREAD = 500.0
 
 
 @inlined
