@@ -129,7 +129,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
             raise ResetNeeded("the episode has not begun or is over: call reset() before step()")
         if np.shape(action) != (1,):
             raise ValueError(f"action={action!r} has shape {np.shape(action)}, it must have shape (1,)")
-        u = applied_force([action], 1, self.task.force_limit)
+        u = applied_force(np.reshape(action, (1, 1)), 1, self.task.force_limit)
         self._steps_left -= 1
         k = self.task.steps - self._steps_left
         x_d = _REST if self._desired is None else self._desired.states[k : k + 1]
