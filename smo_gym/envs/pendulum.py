@@ -119,7 +119,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         super().reset(seed=seed)
         params, x = self.task.case(self.task.draw(self.np_random), options)
         self._x, self._params = x[:, None], params[:, None]
-        self._steps_left = self.task.steps
+        self._steps_left = self._stepper.steps
         samples = np.repeat(x[None, :2], self._stepper.substeps, axis=0)
         return self._observation(0), self._info(samples, 0.0, 0)
 
@@ -127,11 +127,12 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         """Hold the force over one control period."""
         if self._steps_left == 0:
             raise ResetNeeded("the episode has not begun or is over: call reset() before step()")
-        if np.shape(action) != (1,):
-            raise ValueError(f"action={action!r} has shape {np.shape(action)}, it must have shape (1,)")
-        u = applied_force(np.reshape(action, (1, 1)), 1, self.task.force_limit)
+        action = np.asarray(action)
+        if action.shape != (1,):
+            raise ValueError(f"action={action!r} has shape {action.shape}, it must have shape (1,)")
+        u = applied_force(action[None], 1, self.task.force_limit)
         self._steps_left -= 1
-        k = self.task.steps - self._steps_left
+        k = self._stepper.steps - self._steps_left
         x_d = _REST if self._desired is None else self._desired.states[k : k + 1]
         samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
         terminated = bool(failed[0])

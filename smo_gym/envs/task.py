@@ -210,7 +210,7 @@ class Stepper:
     """The compiled part of a step, with the task's numbers unpacked once."""
 
     def __init__(self, task: Task) -> None:
-        self.dt, self.substeps = task.dt, task.substeps
+        self.dt, self.substeps, self.steps = task.dt, task.substeps, task.steps
         weights = [*task.reward.q, task.reward.r]
         self._settings = np.array(
             [*(w * task.control_period for w in weights), task.reward.failure, task.track_limit, task.angle_limit]

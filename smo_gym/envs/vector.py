@@ -184,7 +184,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             self._params[:, i], self._x[:, i] = params, x
         self._params_told = self._params.T.copy()
         self._params_told.flags.writeable = False  # infos share it
-        self._steps_left[mask] = self.task.steps
+        self._steps_left[mask] = self._stepper.steps
         self._terminated[mask] = self._truncated[mask] = False
 
     def _each(self, options: dict[str, Any]) -> list[dict[str, Any]]:
@@ -210,7 +210,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
 
     def _k(self) -> NDArray[np.int64]:
         """The control instant that each slot is at; a slot that is held stays at its last."""
-        return np.minimum(self.task.steps - self._steps_left, self.task.steps)
+        return np.minimum(self._stepper.steps - self._steps_left, self._stepper.steps)
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
         everywhere = self._everywhere
