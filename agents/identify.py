@@ -1,10 +1,11 @@
-"""Recover what the article does not print from what it does: LQR weights and observer slopes from Table 5's LQR cells.
+"""Recover what the article does not print from what it does.
 
-    python agents/identify.py --out identification
+    python agents/identify.py                        # LQR weights (R = 1) and observer slopes, Table 5's LQR cells
+    python agents/identify.py --target smc           # k1..k4 and slopes, Table 5's SMC cells
+    python agents/identify.py --target tracking      # k1..k4, Table 7's averages
 
-CMA-ES from random starts; the gain is the LQR solution for Q = diag(q), R = 1. The state is saved after every
-generation: run the same command again to go on after an interruption. Writes report.md and report.json.
-Needs the extra "reference" (cma).
+CMA-ES from random starts. The state is saved after every generation: run the same command again to go on after an
+interruption. Writes report.md and report.json. Needs the extra "reference" (cma).
 """
 
 from __future__ import annotations
@@ -18,15 +19,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from tabulate import tabulate
 from tqdm import tqdm
 
-from smo_gym import LQR
 from smo_gym.evaluation import files, scenario
-from smo_gym.evaluation.identification import ALTERNATIVES, NAMES, Hypothesis, Search, Table5, profile
+from smo_gym.evaluation.identification import Hypothesis, Problem, Search, Table5, Table7, cost, profile
 
-CONFIG = Path(__file__).resolve().parent.parent / "configs" / "initial-conditions.yaml"
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 FACTORS = (0.8, 0.9, 1.1, 1.25)
 
 
@@ -36,22 +35,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
     )
     add = parser.add_argument
+    add("--target", choices=("lqr", "smc", "tracking"), default="lqr", help="default %(default)s")
     add("--restarts", type=int, default=2, metavar="N", help="random starts (default 2)")
     add("--generations", type=int, default=80, metavar="N", help="of each search (default 80)")
     add("--refit", type=int, default=10, metavar="N", help="generations for each rejected hypothesis (default 10)")
     add("--seed", type=int, default=0, help="of the first start (default 0)")
     add("--out", type=Path, default=Path("identification"), metavar="DIR", help="default %(default)s")
     args = parser.parse_args(arguments)
-    plan = {name: getattr(args, name) for name in ("restarts", "generations", "refit", "seed")}
+    plan = {name: getattr(args, name) for name in ("target", "restarts", "generations", "refit", "seed")}
     try:
         if min(args.restarts, args.generations) < 1 or min(args.refit, args.seed) < 0:
             raise ValueError("--restarts and --generations must be at least 1, --refit and --seed at least 0")
-        one = scenario.load(CONFIG)
+        problem = target(args.target)
         out = files.prepare(args.out)
-        problem = Table5(dict(one.initial_states.value), one.control_period.value)
-        searches = resume(out / "state.pkl", plan) or [
+        searches = resume(out / "state.pkl", plan, problem) or [
             *(Search(problem, Hypothesis(), args.seed + i) for i in range(args.restarts)),
-            *(Search(problem, alternative, args.seed) for alternative in ALTERNATIVES if args.refit),
+            *(Search(problem, alternative, args.seed) for alternative in problem.alternatives if args.refit),
         ]
     except (ValueError, ImportError) as error:
         print(f"identify.py: error: {error}", file=sys.stderr)
@@ -76,7 +75,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def resume(path: Path, plan: dict[str, int]) -> list[Search] | None:
+def target(name: str) -> Problem:
+    """The published numbers to fit."""
+    if name == "tracking":
+        return Table7(scenario.load(CONFIGS / "tracking.yaml"))
+    return Table5(scenario.load(CONFIGS / "initial-conditions.yaml"), name)
+
+
+def resume(path: Path, plan: dict[str, Any], problem: Problem) -> list[Search] | None:
     """The searches of an interrupted run, or None where there was none.
 
     Raises:
@@ -84,48 +90,52 @@ def resume(path: Path, plan: dict[str, int]) -> list[Search] | None:
     """
     if not path.exists():
         return None
-    before, searches = pickle.loads(path.read_bytes())
+    try:
+        before, searches = pickle.loads(path.read_bytes())
+    except (pickle.UnpicklingError, EOFError):
+        raise ValueError(f"{path} is damaged: remove it to start anew") from None
     if before != plan:
         raise ValueError(f"{path} belongs to a run with {before}, not {plan}: choose another --out or remove it")
+    for search in searches:
+        search.problem = problem
     return list(searches)
 
 
-def report(problem: Table5, searches: Sequence[Search]) -> tuple[str, dict[str, Any]]:
+def report(problem: Problem, searches: Sequence[Search]) -> tuple[str, dict[str, Any]]:
     """What was found, as text and as data."""
-    ours = sorted((s for s in searches if s.hypothesis == Hypothesis()), key=lambda s: s.best_cost)
+    ours = sorted((s for s in searches if s.hypothesis == Hypothesis()), key=lambda s: s.rms)
     best = ours[0]
     settings = 10.0**best.best
-    K = LQR.design(settings[:4], 1.0).K[0]
+    names = list(problem.parameters)
     off = problem.deviations(best.best[None], Hypothesis())[0]
     around = profile(problem, Hypothesis(), best.best, FACTORS)
-    at_best = [float(np.sqrt(problem.cost(best.best[None], s.hypothesis)[0] / 16)) for s in searches]
+    at_best = [float(cost(problem, best.best[None], s.hypothesis)[0]) for s in searches]
     found = [[f"start {i + 1}", f"{100 * s.rms:.2f}", *(f"{v:.4g}" for v in 10.0**s.best)] for i, s in enumerate(ours)]
-    cells = [
-        (f"case {cell.case}", cell.state, cell.compensation, f"{100 * math.expm1(d):+.1f}")
-        for cell, d in zip(problem.cells(), off, strict=True)
-    ]
-    profiles = [(name, *(f"{100 * rms:.1f}" for rms in row)) for name, row in zip(NAMES, around, strict=True)]
+    cells = [(label, f"{100 * math.expm1(d):+.1f}") for label, d in zip(problem.labels(), off, strict=True)]
+    profiles = [(name, *(f"{100 * rms:.1f}" for rms in row)) for name, row in zip(names, around, strict=True)]
     rejected = [
         (s.hypothesis.name, f"{100 * held:.0f}", f"{100 * s.rms:.0f}")
         for s, held in zip(searches, at_best, strict=True)
         if s.hypothesis != Hypothesis()
     ]
     parts = [
-        "# Identification of Table 5's LQR runs",
-        f"Best: RMS of log(measured/published) {100 * best.rms:.2f} % over 16 cells, K = {np.round(K, 3).tolist()}.",
+        "# Identification",
+        f"Best: RMS of log(measured/published) {100 * best.rms:.2f} % over {len(off)} published numbers.",
         "## Settings found from each random start",
-        tabulate(found, ("", "RMS, %", *NAMES), tablefmt="github", disable_numparse=True),
+        tabulate(found, ("", "RMS, %", *names), tablefmt="github", disable_numparse=True),
         "## Residuals in percent",
-        tabulate(cells, ("", "state", "compensation", "off, %"), tablefmt="github", disable_numparse=True),
+        tabulate(cells, ("", "off, %"), tablefmt="github", disable_numparse=True),
         "## How well each setting is determined: RMS in percent when it alone is multiplied",
         tabulate(profiles, ("", *(f"by {f}" for f in FACTORS)), tablefmt="github", disable_numparse=True),
-        "## Rejected hypotheses: RMS in percent",
-        tabulate(rejected, ("", "same settings", "refitted"), tablefmt="github", disable_numparse=True),
     ]
+    if rejected:
+        spent = max(s.generations for s in searches if s.hypothesis != Hypothesis())
+        header = ("", "same settings", f"refitted, {spent} generations from a random start")
+        parts.append("## Rejected hypotheses: RMS in percent")
+        parts.append(tabulate(rejected, header, tablefmt="github", disable_numparse=True))
     data = {
         "rms": best.rms,
-        "settings": dict(zip(NAMES, settings.tolist(), strict=True)),
-        "K": K.tolist(),
+        "settings": dict(zip(names, settings.tolist(), strict=True)),
         "deviations": off.tolist(),
         "rejected": {s.hypothesis.name: s.rms for s in searches if s.hypothesis != Hypothesis()},
     }

@@ -17,6 +17,7 @@ import numpy as np
 
 from smo_gym.evaluation import files, scenario
 from smo_gym.reference import ReferenceNotFound, minimum_energy
+from smo_gym.validation import multiple
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "tracking.yaml"
 
@@ -52,6 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     try:
         files.prepare(args.out.parent)
+        multiple("horizon / elements", args.horizon / max(args.elements, 1), "1 ms", 0.001)
         found = minimum_energy(args.start, args.end, args.horizon, args.force_limit, args.elements)
         finer = minimum_energy(args.start, args.end, args.horizon, args.force_limit, args.elements, refine=2)
     except (ValueError, ImportError, ReferenceNotFound) as error:

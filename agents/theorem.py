@@ -92,16 +92,16 @@ def gain_conditions(gains: dict[str, Gains], over: theorem.OperatingSet) -> None
 
 def runs(found: Convergence, settings: TheoremSettings) -> None:
     """What the runs showed."""
-    stayed = found.stayed
-    n, inside = int(stayed.sum()), np.all(found.reached <= found.promised, axis=0)[stayed]
-    print(
-        f"{n} of {len(stayed)} runs stayed in the operating set; {len(stayed) - n} left it and are not counted below."
-    )
+    stayed, total = found.tested, len(found.stayed)
+    n, inside = int(stayed.sum()), int(found.kept[stayed].sum())
+    bounds = ", ".join(f"{value:.2f}" for value in found.largest)
+    print(f"Largest |theta|, |h'|, |theta'| and estimates of these: {bounds}.")
+    print(f"{n} of {total} runs stayed in the operating set and outlasted t0; {total - n} did not and are not counted.")
     if not n:
         return
-    interval = stats.binomtest(int(inside.sum()), n).proportion_ci(method="wilson")
+    interval = stats.binomtest(inside, n).proportion_ci(method="wilson")
     print(
-        f"{inside.sum()} of {n} were inside the layer of both positions by the time of (43) and stayed there "
+        f"{inside} of {n} were inside the layer of both positions by the time of (43) and stayed there "
         f"(95 % Wilson interval {interval.low:.4f} to {interval.high:.4f}).\n"
     )
     rows = [
@@ -111,7 +111,7 @@ def runs(found: Convergence, settings: TheoremSettings) -> None:
             f"{np.median(found.reached[i, stayed]):.3f}",
             f"{np.min((found.promised - found.reached)[i, stayed]):.4f}",
             f"{np.median(found.promised_velocity[i, stayed]):.3f}",
-            f"{np.max(found.velocity_error[i, stayed]):.3f}",
+            f"{np.nanmax(found.velocity_error[i, stayed]):.3f}",
         )
         for i, state in enumerate(("h", "theta"))
     ]

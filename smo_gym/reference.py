@@ -42,6 +42,9 @@ class Reference:
         cost: J of equation (53) in J s.
         u: force in N in each of equally long elements.
         params: [M_c, m, l, g] of the plant that follows it, shape (4,).
+
+    Raises:
+        ValueError: a field is of a wrong shape or not allowed.
     """
 
     x0: tuple[float, ...]
@@ -51,6 +54,18 @@ class Reference:
     cost: float
     u: tuple[float, ...]
     params: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("x0", "xT", "params"):
+            value = array(f"reference {name}", getattr(self, name), (4,))
+            object.__setattr__(self, name, tuple(value.tolist()))
+        CartPendulum.of(self.params)
+        for name in ("horizon", "force_limit"):
+            object.__setattr__(self, name, number(f"reference {name}", getattr(self, name), above=0.0))
+        object.__setattr__(self, "cost", number("reference cost", self.cost))
+        if np.ndim(self.u) != 1 or len(self.u) == 0:
+            raise ValueError(f"reference u has shape {np.shape(self.u)}, it must hold one force an element")
+        object.__setattr__(self, "u", tuple(array("reference u", self.u, (len(self.u),)).tolist()))
 
     def trajectory(self, dt: float) -> Array:
         """States x_d (4, N + 1) at 0, dt, ..., T: the plant integrated with Runge-Kutta steps of ``dt``.
@@ -91,15 +106,7 @@ class Reference:
                 raise ValueError(unknown("field of a reference", name, known))
         if missing := [name for name in known if name not in reference]:
             raise ValueError(f"reference lacks {', '.join(missing)}")
-        return cls(
-            x0=tuple(array("reference x0", reference["x0"], (4,)).tolist()),
-            xT=tuple(array("reference xT", reference["xT"], (4,)).tolist()),
-            horizon=number("reference horizon", reference["horizon"], above=0.0),
-            force_limit=number("reference force_limit", reference["force_limit"], above=0.0),
-            cost=number("reference cost", reference["cost"]),
-            u=tuple(array("reference u", reference["u"], (len(reference["u"]),)).tolist()),
-            params=tuple(array("reference params", reference["params"], (4,)).tolist()),
-        )
+        return cls(**reference)
 
 
 def shipped() -> Reference:

@@ -172,10 +172,12 @@ def layer(speed: ArrayLike, m1: ArrayLike, slope: float) -> Array:
 def reaching_time(error: ArrayLike, gain: ArrayLike, supremum: ArrayLike) -> Array:
     """The time of (43), ``|e(0)| / kappa`` with ``kappa = gain - supremum``; of (48) likewise, from t0 on.
 
+    The article proves them for sgn. With tanh they are a yardstick: its rate falls off towards the layer.
+
     Infinite where the gain does not exceed the supremum.
     """
     kappa = np.asarray(gain) - np.asarray(supremum)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(kappa > 0.0, np.abs(error) / np.maximum(kappa, 0.0), np.inf))
 
 

@@ -114,7 +114,10 @@ def test_stable_baselines3_evaluates_a_law(law):
         (lambda: SlidingModeController((1, 1, 1, 0), 0.001, 1.0), "k=.* must be positive"),
         (lambda: SlidingModeController((1, 1, 1), 0.001, 1.0), r"k has shape \(3,\)"),
         (lambda: SlidingModeController((1, 1, 1, 1), 0.0, 1.0), "dt=0.0 must be a finite number greater than 0"),
-        (lambda: SlidingModeController((1, 1, 1, 1), 0.001, -1.0), "slope=-1.0 must be a finite number greater than 0"),
+        (
+            lambda: SlidingModeController((1, 1, 1, 1), 0.001, -1.0),
+            "slope=-1.0 must be positive, one number or one a slot",
+        ),
         (lambda: LQR([1, 1, 1, 1]).predict(np.zeros((3, 2))), "wrap the environment in smo_gym.ObserverWrapper"),
         (lambda: LQR(np.ones((3, 4))).predict(np.zeros((5, 6))), r"K has 3 slots, the observation has shape \(5, 6\)"),
         (lambda: LQR("abc"), "K has shape"),

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from smo_gym.evaluation import scenario
-from smo_gym.evaluation.identification import ALTERNATIVES, Hypothesis, Table5, profile
+from smo_gym.evaluation.identification import ALTERNATIVES, Hypothesis, Table5, Table7, cost, profile
 
 ROOT = Path(__file__).resolve().parent.parent
 KNOWN = np.log10([51.8, 57.4, 59.3, 0.284, 12.5, 12.5])
@@ -19,12 +19,11 @@ pytest.importorskip("cma")
 
 @pytest.fixture(scope="module")
 def problem():
-    one = scenario.load(ROOT / "configs" / "initial-conditions.yaml")
-    return Table5(dict(one.initial_states.value), one.control_period.value)
+    return Table5(scenario.load(ROOT / "configs" / "initial-conditions.yaml"), "lqr")
 
 
 def rms(problem, hypothesis):
-    return float(np.sqrt(problem.cost(KNOWN[None], hypothesis)[0] / 16))
+    return float(cost(problem, KNOWN[None], hypothesis)[0])
 
 
 def test_the_settings_in_configs_fit_and_the_alternatives_do_not(problem):
@@ -36,14 +35,28 @@ def test_the_settings_in_configs_fit_and_the_alternatives_do_not(problem):
 
 def test_candidates_do_not_disturb_each_other(problem):
     other = KNOWN + 0.1
-    together = problem.cost(np.array([KNOWN, other, KNOWN]), Hypothesis())
-    assert together[0] == together[2] == problem.cost(KNOWN[None], Hypothesis())[0]
+    together = cost(problem, np.array([KNOWN, other, KNOWN]), Hypothesis())
+    assert together[0] == together[2] == cost(problem, KNOWN[None], Hypothesis())[0]
     assert together[1] != together[0]
 
 
 def test_the_profile_rises_away_from_the_optimum(problem):
     around = profile(problem, Hypothesis(), KNOWN, (0.8, 1.25))
     assert (around[:3] > rms(problem, Hypothesis())).all()
+
+
+def test_the_settings_in_configs_fit_table_5_under_smc():
+    smc = Table5(scenario.load(ROOT / "configs" / "initial-conditions.yaml"), "smc")
+    point = np.log10([1.4, 3.4, 3.3, 0.8, 33.3, 12.5, 12.5])
+    worse = np.log10([1.4, 3.4, 2.0, 0.8, 33.3, 12.5, 12.5])
+    here, there = cost(smc, np.array([point, worse]), Hypothesis())
+    assert here < 0.1 < 0.2 < there
+
+
+def test_the_settings_in_configs_fit_table_7():
+    tracking = Table7(scenario.load(ROOT / "configs" / "tracking.yaml"))
+    here, there = cost(tracking, np.log10([[2.5, 2.4, 2.7, 0.86], [1.4, 3.4, 3.3, 0.8]]), Hypothesis())
+    assert here < 0.15 < there
 
 
 def identify(out, *options):

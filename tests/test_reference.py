@@ -1,5 +1,7 @@
 """The minimum-energy reference and the environment that follows it."""
 
+from dataclasses import asdict, replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -86,11 +88,12 @@ def test_the_shipped_reference_needs_no_solver_and_ends_at_rest():
         ({"horizn": 1.0}, r"unknown field of a reference 'horizn': did you mean 'horizon'\?"),
         ({"x0": [1.0]}, r"reference x0 has shape \(1,\)"),
         ({"horizon": 0.0}, "reference horizon=0.0"),
+        ({"u": []}, r"reference u has shape \(0,\)"),
+        ({"u": 3.0}, r"reference u has shape \(\)"),
+        ({"params": [-1.0, 0.3, 0.4, 9.8]}, "cart_mass=-1.0 must be"),
     ],
 )
 def test_bad_references_are_named(change, message):
-    from dataclasses import asdict
-
     with pytest.raises(ValueError, match=message):
         Reference.of({**asdict(shipped()), **change})
 
@@ -117,6 +120,25 @@ def test_after_the_reference_there_is_rest():
         steps += 1
     assert steps == 550
     assert (observation[2:] == 0.0).all()
+
+
+def test_a_held_slot_is_told_the_same_reference(make_vec):
+    env = make_vec(2, "SMOPendulumTracking-v0", autoreset_mode="Disabled", track_limit=1.5)
+    env.reset(seed=0, options={"state": np.array([[1.49, 0, 5, 0], [1, 1, 0.1, 0.01]])})
+    observation, _, terminated, *_ = env.step(np.zeros((2, 1)))
+    assert terminated.tolist() == [True, False]
+    later = [env.step(np.zeros((2, 1))) for _ in range(3)][-1]
+    assert (later[0][0] == observation[0]).all()
+    assert (later[0][1] != observation[1]).any()
+    assert (later[4]["desired"][0, -1] == observation[0, 2:4]).all()
+
+
+def test_a_reference_belongs_to_its_plant_and_ends_at_rest():
+    with pytest.raises(ValueError, match="reference was computed for the plant"):
+        gymnasium.make("SMOPendulumTracking-v0", params={"gravity": 9.8})
+    moving = replace(shipped(), xT=(0.0, 0.0, 1.0, 0.0))
+    with pytest.raises(ValueError, match="must be an equilibrium"):
+        gymnasium.make("SMOPendulumTracking-v0", reference=moving)
 
 
 def test_the_reward_weighs_the_error():
@@ -153,8 +175,6 @@ def test_lqr_follows_better_than_it_would_by_resting():
 
 def test_another_reference_sets_start_and_horizon():
     other = Reference((0.5, 0.0, 0.0, 0.0), (0, 0, 0, 0), 2.0, 1.0, 0.0, (0.0,) * 20, (3.5, 0.32, 0.44, -9.8))
-    from dataclasses import asdict
-
     for given in (other, asdict(other)):
         env = gymnasium.make("SMOPendulumTracking-v0", reference=given)
         assert env.unwrapped.task.horizon == 2.0

@@ -99,16 +99,19 @@ def test_errors_are_in_their_layers_when_the_theorem_says_so():
     }
     agent = LQR([7.197, -4.026, 10.96, -0.9999])
     found = converge(observers, agent, SET, starts, plants, horizon=3.0, settle=1.5)
-    assert found.stayed.mean() > 0.9
-    assert (found.reached <= found.promised)[:, found.stayed].all()
+    assert found.tested.mean() > 0.9
+    assert found.kept[found.tested].all()
+    assert not converge(observers, agent, SET, starts, plants, horizon=0.02, settle=0.0).tested.all()
     assert (found.promised < 1.0).all()
     assert (found.velocity_rms["designed"] < 0.2 * found.velocity_rms["sluggish"]).all()
     # and the check can fail: gains that break (28) do not keep what a smaller set would let them promise
     slow = {"sluggish": observers["sluggish"]}
+    with pytest.raises(ValueError, match="m1 must exceed the speeds"):
+        converge(slow, agent, SET, starts, plants, horizon=1.0, settle=0.5)
     tight = OperatingSet(theta=0.7, speed=(1.0, 1.0), speed_hat=(6.0, 6.0), uncertainty=0.2)
     failing = converge(slow, agent, tight, starts, plants, horizon=3.0, settle=1.5)
     assert not failing.stayed.all()
-    assert not (failing.reached <= failing.promised).all()
+    assert not failing.kept.all()
 
 
 @pytest.mark.parametrize(
@@ -135,9 +138,15 @@ def test_the_command(tmp_path):
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     assert "30 of 30 were inside the layer of both positions by the time of (43)" in text
     assert "(52) holds for" in text
-    (tmp_path / "bad.yaml").write_text((ROOT / "configs" / "theorem.yaml").read_text().replace("margin:", "margn:"))
-    bad = subprocess.run(
-        [*command, "--config", str(tmp_path / "bad.yaml")], capture_output=True, text=True, check=False
+    changes = (
+        ("margin:", "margn:", "did you mean 'margin'?"),
+        ("[-0.5, -0.5,", "[0.6, -0.5,", "the set of initial states holds no point"),
+        ("settle: {value: 2.0", "settle: {value: 9.0", "settle=9.0 must lie between 0 and horizon=6.0"),
     )
-    assert bad.returncode == 2
-    assert "did you mean 'margin'?" in bad.stderr
+    settings = (ROOT / "configs" / "theorem.yaml").read_text()
+    for old, new, message in changes:
+        (tmp_path / "bad.yaml").write_text(settings.replace(old, new))
+        options = [*command, "--config", str(tmp_path / "bad.yaml")]
+        bad = subprocess.run(options, capture_output=True, text=True, check=False)
+        assert bad.returncode == 2
+        assert message in bad.stderr

@@ -67,6 +67,7 @@ def test_the_oracle_of_a_batch_gives_the_last_state_of_an_episode(make_vec):
     assert (observation[:, :2] == info["state"][:, :2]).all()
 
 
+@pytest.mark.parametrize("env_id", ["SMOPendulum-v0", "SMOPendulumUpright-v0"])
 def test_the_model_is_the_environments_nominal_plant(env_id):
     def estimate(observer, **params):
         env = gymnasium.make(env_id, params=params)

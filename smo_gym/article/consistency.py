@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 
 import numpy as np
 
-from . import Cell, published
+from . import published
 
 REGULATION = ("4",)  # the only regulation table with RMS columns
 
@@ -51,7 +51,7 @@ def _roots() -> Iterator[Check]:
     """Each RMS cell beside the root of its MSE cell."""
     for cell, rms in published().items():
         if cell.metric == "rms":
-            mse = published()[_at(cell, "mse")]
+            mse = published()[replace(cell, metric="mse")]
             yield Check(
                 cell.table,
                 cell.controller,
@@ -97,10 +97,6 @@ def _summaries() -> Iterator[Check]:
             alternative,
             tolerance,
         )
-
-
-def _at(cell: Cell, metric: str) -> Cell:
-    return Cell(cell.table, cell.controller, cell.uncertainty_percent, cell.case, metric, cell.state, cell.compensation)
 
 
 def _column(table: str, controller: str, metric: str, state: str, arm: str, case: str | None = None) -> np.ndarray:

@@ -13,8 +13,10 @@ def estimated_error(observation: Array) -> Array:
 
     The observation is [h, theta, xhat (4)], or with a reference [h, theta, x_d (4), preview (4 each), xhat (4)].
 
+    An unobserved tracking environment cannot be told from an observed one by its size: wrap it.
+
     Raises:
-        ValueError: the observation has another size: it comes from an environment without an observer.
+        ValueError: the observation cannot come from an observer wrapper.
     """
     size = observation.shape[-1]
     if size < 6 or (size - 2) % 4:

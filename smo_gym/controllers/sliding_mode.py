@@ -27,9 +27,9 @@ class SlidingModeController:
     S is tanh with a slope (Remark 7). The integral is the law's state: it grows by ``dt tanh(s_k)`` after u_k is taken.
 
     Args:
-        k: (k1, k2, k3, k4), positive, shape (4,). Not printed in the article.
+        k: (k1, k2, k3, k4), positive, shape (4,); or (n, 4), one a slot. Not printed in the article.
         dt: control period in s.
-        slope: of the tanh that stands for sgn; ``math.inf`` for exact sgn. Not printed in the article.
+        slope: of the tanh that stands for sgn; ``math.inf`` for exact sgn; or (n,). Not printed in the article.
         Z0: amplitude in N (Table 6).
         lam: weight of the integral (Table 6).
         epsilon: period of the switching function (Table 6).
@@ -42,21 +42,27 @@ class SlidingModeController:
         self,
         k: ArrayLike,
         dt: float,
-        slope: float,
+        slope: ArrayLike,
         Z0: float = SMC_GAINS["Z0"],
         lam: float = SMC_GAINS["lam"],
         epsilon: float = SMC_GAINS["epsilon"],
     ) -> None:
-        self.k = array("k", k, (4,))
+        shape = np.shape(k)
+        if shape[-1:] != (4,) or len(shape) > 2:
+            raise ValueError(f"k has shape {shape}, it must have shape (4,) or (n, 4)")
+        self.k = array("k", k, shape)
         if (self.k <= 0.0).any():
             raise ValueError(f"k={self.k.tolist()} must be positive")
+        self.slope = np.array(slope, dtype=np.float64)
+        if self.slope.shape not in ((), shape[:-1]) or not (self.slope > 0.0).all():
+            raise ValueError(f"slope={slope!r} must be positive, one number or one a slot")
         self.dt = number("dt", dt, above=0.0)
-        self.slope = slope if slope == math.inf else number("slope", slope, above=0.0)
         self.Z0 = number("Z0", Z0, above=0.0)
         self.lam = number("lam", lam, above=0.0)
         self.epsilon = number("epsilon", epsilon, above=0.0)
-        steep = min(self.slope, 1e300)  # tanh(1e300 x) is sgn(x)
-        self._settings = np.array([*self.k, self.Z0, self.lam, math.pi / self.epsilon, steep, self.dt])
+        rows = [self.k, np.broadcast_to(np.minimum(self.slope, 1e300)[..., None], (*shape[:-1], 1))]  # 1e300: sgn
+        self._gains = np.atleast_2d(np.concatenate(rows, axis=-1))
+        self._settings = np.array([self.Z0, self.lam, math.pi / self.epsilon, self.dt])
 
     def predict(
         self,
@@ -81,11 +87,13 @@ class SlidingModeController:
         """
         e = np.atleast_2d(estimated_error(observation))
         n = len(e)
+        if len(self._gains) not in (1, n):
+            raise ValueError(f"k has {len(self._gains)} slots, the observation has shape {observation.shape}")
         integral = np.zeros(n) if state is None else array("state[0]", state[0], (n,))
         if episode_start is not None:
             integral[np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), n)] = 0.0
         u = np.empty((n, 1))
-        _switch(e, integral, self._settings, u)
+        _switch(e, integral, self._gains, self._settings, u)
         return (u if observation.ndim == 2 else u[0]), (integral,)
 
     def __repr__(self) -> str:
@@ -94,9 +102,10 @@ class SlidingModeController:
 
 
 @kernel
-def _switch(e: Array, integral: Array, settings: Array, u: Array) -> None:
-    k1, k2, k3, k4, Z0, lam, pi_over_epsilon, slope, dt = settings
+def _switch(e: Array, integral: Array, gains: Array, settings: Array, u: Array) -> None:
+    Z0, lam, pi_over_epsilon, dt = settings
     for i in range(len(u)):
+        k1, k2, k3, k4, slope = gains[min(i, len(gains) - 1)]  # one row for all slots, or one each
         h, theta, v, omega = e[i, 0], e[i, 1], e[i, 2], e[i, 3]
         cart = k1 * h + k3 * v
         rod = k2 * theta + k4 * omega

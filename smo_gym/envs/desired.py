@@ -28,6 +28,8 @@ class Desired:
         multiple("reference horizon", reference.horizon, "dt", task.dt)
         x_d = reference.trajectory(task.dt).T
         needed = (task.steps + task.preview) * n + 1
+        if len(x_d) < needed and (np.any(reference.xT[2:]) or abs(np.sin(reference.xT[1])) > 1e-9):
+            raise ValueError(f"reference xT={reference.xT} must be an equilibrium: the task goes on after its end")
         rest = np.repeat([reference.xT], max(needed - len(x_d), 0), axis=0)
         x_d = np.concatenate([x_d, rest])
         ahead = x_d[:needed:n]

@@ -101,6 +101,10 @@ class Task:
         set_(self, "uncertainty", number("uncertainty", self.uncertainty))
         if not 0.0 <= self.uncertainty < 1.0:
             raise ValueError(f"uncertainty={self.uncertainty!r} must be a fraction in [0, 1)")
+        if self.reference is not None and self.reference.params != tuple(self.params.as_array().tolist()):
+            raise ValueError(
+                f"reference was computed for the plant {self.reference.params}, it must be for params={self.params}"
+            )
         if not isinstance(self.preview, int) or self.preview < 0:
             raise ValueError(f"preview={self.preview!r} must be a whole number of at least 0")
         for name in ("force_limit", "track_limit", "angle_limit"):

@@ -120,7 +120,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         if waiting:
             held = self._x[:, over]
             u[over] = 0.0
-        self._steps_left -= 1
+        self._steps_left[~over] -= 1
         x_d = self._rest if self._desired is None else self._desired.states[self._k()]
         samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
         terminated, truncated = failed, (self._steps_left == 0) & ~failed
@@ -210,7 +210,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
 
     def _k(self) -> NDArray[np.int64]:
         """The control instant that each slot is at; a slot that is held stays at its last."""
-        return np.minimum(self._stepper.steps - self._steps_left, self._stepper.steps)
+        return self._stepper.steps - self._steps_left
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
         everywhere = self._everywhere

@@ -39,6 +39,18 @@ class Convergence:
     """RMS errors of h' and theta' over all runs that stayed, after the settling time, observer by observer, (2,)."""
     largest: Array
     """Largest |theta|, |h'|, |theta'| and their estimates over all runs, (6,)."""
+    horizon: float
+    """Of the runs in s: what was promised for later was not tested."""
+
+    @property
+    def tested(self) -> NDArray[np.bool_]:
+        """Runs that stayed in the operating set and outlasted both promised times, (n,)."""
+        return self.stayed & (self.promised < self.horizon).all(axis=0)
+
+    @property
+    def kept(self) -> NDArray[np.bool_]:
+        """Runs whose position errors were both in their layers from the promised times on, (n,)."""
+        return np.asarray((self.reached <= self.promised).all(axis=0))
 
 
 def converge(
@@ -65,7 +77,12 @@ def converge(
         settle: where the RMS of the velocity errors begins, in s.
         dt: sampling and control period in s.
         progress: called with the number of samples done since the last call.
+
+    Raises:
+        ValueError: the first observer's m1 does not exceed the speeds of the operating set: nothing is promised.
     """
+    if not (np.array(next(iter(observers.values())).gains.m1) > over.speed).all():  # type: ignore[union-attr]
+        raise ValueError(f"the first observer's m1 must exceed the speeds {over.speed} of the operating set, (28)")
     n, steps = len(starts), round(horizon / dt)
     env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
         "SMOPendulum-v0",
@@ -86,8 +103,9 @@ def converge(
     x = info["state"].T
     promised = reaching_time(x[:2] - watched.xhat[:2], np.array(gains.m1)[:, None], bounds.speed[:, None])
     promised_velocity = np.full((2, n), np.nan)
-    stayed = np.ones(n, dtype=np.bool_)
-    reached, velocity_error, largest = np.zeros((2, n)), np.zeros((2, n)), np.zeros(6)
+    stayed = over.holds(x, watched.xhat)
+    reached, velocity_error = np.zeros((2, n)), np.full((2, n), np.nan)
+    largest = np.abs(np.concatenate([x[1:], watched.xhat[1:]])).max(axis=1)
     squares, count = {name: np.zeros((2, n)) for name in observers}, 0
     for k in range(1, steps + 1):
         action, _ = agent.predict(np.concatenate([y, watched.xhat.T], axis=1))
@@ -105,7 +123,7 @@ def converge(
         at_t0 = np.isnan(promised_velocity) & (time >= promised)
         t1 = promised + reaching_time(error, np.array(gains.beta_1)[:, None], bounds.drift[:, None])
         promised_velocity = np.where(at_t0, t1, promised_velocity)
-        velocity_error = np.where(time >= promised_velocity, np.maximum(velocity_error, error), velocity_error)
+        velocity_error = np.where(time >= promised_velocity, np.fmax(velocity_error, error), velocity_error)
         if time >= settle:
             count += 1
             for name, estimator in estimators.items():
@@ -121,4 +139,5 @@ def converge(
         velocity_error=velocity_error,
         velocity_rms={name: np.sqrt(total[:, stayed].mean(axis=1) / count) for name, total in squares.items()},
         largest=largest,
+        horizon=horizon,
     )

@@ -1,4 +1,4 @@
-"""From runs to the cells of a table: means, medians, bootstrap intervals, reductions, beside what was published."""
+"""From runs to the cells of a table: means, medians, Student's intervals, reductions, beside what was published."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
     low, high = _interval(values[complete])
     mse = Result(
         cell=cell,
-        published=_published(rows, state, cell),
+        published=_published(rows, cell),
         measured=_mean(values[complete]),
         ci_low=max(low, 0.0),
         ci_high=high,
@@ -105,7 +105,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
     rms = replace(
         mse,
         cell=rms_cell,
-        published=_published(rows, state, rms_cell),
+        published=_published(rows, rms_cell),
         measured=math.sqrt(mse.measured),
         ci_low=math.sqrt(mse.ci_low),
         ci_high=math.sqrt(mse.ci_high),
@@ -120,7 +120,7 @@ def _runs(rows: Sequence[Outcome], state: str) -> tuple[Array, NDArray[np.bool_]
     return values, np.isfinite(values)
 
 
-def _published(rows: Sequence[Outcome], state: str, cell: Cell) -> float:
+def _published(rows: Sequence[Outcome], cell: Cell) -> float:
     """The printed number; of an average, the mean of the printed cells that it averages."""
     keys = [replace(cell, uncertainty_percent=level, case=case) for level, case in map(_place, rows)]
     numbers = [published().get(key, math.nan) for key in keys]
@@ -138,11 +138,13 @@ def _reduction(rows: Sequence[Outcome], state: str, uncertainty: str, case: str)
     ratio = _mean(b) / _mean(a)
     # the ratio of two means to first order: each pair's share in the deviation from it (delta method)
     low, high = _interval(100.0 * (1.0 - ratio - (b - ratio * a) / _mean(a)))
-    printed = [_cells(arm, state, uncertainty, case)[0] for arm in arms.values()]
+    group = rows[0].group
+    cells = [Cell(group.scenario.table, group.name, uncertainty, case, "mse", state, arm) for arm in arms]
+    printed = [_published(arm, cell) for arm, cell in zip(arms.values(), cells, strict=True)]
     return [
         Result(
-            cell=replace(printed[0].cell, metric="mse_reduction_percent", compensation=""),
-            published=100.0 * (1.0 - printed[1].published / printed[0].published),
+            cell=replace(cells[0], metric="mse_reduction_percent", compensation=""),
+            published=100.0 * (1.0 - printed[1] / printed[0]),
             measured=100.0 * (1.0 - ratio),
             ci_low=low,
             ci_high=high,

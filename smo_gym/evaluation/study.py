@@ -18,7 +18,7 @@ from .scenario import ControllerSettings, Scenario
 
 Array = NDArray[np.float64]
 ARMS = ("without", "with", "theorem", "oracle")
-"""Compensation of the input uncertainty off, on; gains that satisfy the theorem; the true state for an estimate."""
+"""Compensation of the input uncertainty off, on; gains designed for the theorem; the true state for an estimate."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +64,10 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
     for scenario in scenarios:
         if "theorem" in arms and scenario.designed is None:
             raise ValueError(f"scenario {scenario.title!r} has no setting 'designed' for the theorem's gains")
+        if "theorem" in arms and max(scenario.uncertainty.value) > scenario.designed.operating_set.uncertainty.value:  # type: ignore[union-attr]
+            raise ValueError(
+                f"uncertainty={scenario.uncertainty.value} is beyond what the theorem's gains are designed for"
+            )
     return [
         Group(scenario, controller, level, case, arm, runs if level > 0.0 else 1)
         for scenario in scenarios
