@@ -59,7 +59,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--observer",
         type=one_of("observer", (*ARMS, "all")),
         default="smo",
-        help="smo (default), theorem (gains that satisfy it), oracle (the true state) or all",
+        help="smo (default), theorem (gains designed for it), oracle (the true state) or all",
     )
     add(
         "--compensation",
