@@ -7,7 +7,7 @@ from conftest import assert_same
 from scipy.linalg import expm
 
 import smo_gym
-from smo_gym import LQR, CartPendulum, SlidingModeController, VectorObserverWrapper
+from smo_gym import LQR, CartPendulum, SlidingModeController, SlidingModeObserver, VectorObserverWrapper
 from smo_gym.article import Cell, published
 from smo_gym.evaluation import rollout, scenario, statistics, study, tables
 
@@ -73,6 +73,16 @@ def test_decimated_traces_are_part_of_the_full_ones(closed_loop):
     assert (part.x == full.x[::7]).all()
     assert (part.u == full.u[::7]).all()
     assert closed_loop(2).traces is None
+
+
+def test_an_estimate_that_diverges_fails_its_run_alone(make_vec):
+    # spinning in the estimate alone, with a gain that cannot stop it: thetahat'' grows with its square
+    observers = [SlidingModeObserver(xhat0=(0.0, 0.8, 0.0, 60.0)), SlidingModeObserver()]
+    env = VectorObserverWrapper(make_vec(2, autoreset_mode="Disabled", horizon=2.1), observers)
+    result = rollout(env, LQR(K), options={"state": np.array([[0.0, 0.8, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0]])})
+    assert result.failed.tolist() == [True, False]
+    assert np.isfinite([values[1] for values in result.metrics.values()]).all()
+    assert result.metrics["duration"][0] < result.metrics["duration"][1] == pytest.approx(2.1)
 
 
 def test_a_failed_run_is_held_and_the_others_go_on(closed_loop):

@@ -14,6 +14,8 @@ from ..envs.task import Task
 from . import metrics
 
 Array = NDArray[np.float64]
+# An observer of poor gains can diverge while its plant goes on. No estimate in m, rad, m/s, rad/s comes near this.
+_DIVERGED = 1e4
 
 
 class Agent(Protocol):
@@ -51,7 +53,7 @@ class Rollout:
     metrics: dict[str, Array]
     """Metric name (:data:`smo_gym.evaluation.metrics.NAMES`) to values (n,), over each run's own duration."""
     failed: NDArray[np.bool_]
-    """Runs that terminated: off the track, fallen or not finite, (n,)."""
+    """Runs that terminated (off the track, fallen, not finite) or whose estimate diverged, (n,)."""
     traces: Traces | None
 
 
@@ -100,13 +102,14 @@ def rollout(
     later = ~first
     failures = 0
     for k in range(1, task.steps + 1):
-        action, agent_state = agent.predict(observation, agent_state, first, True)
+        seen = np.where(failed[:, None], 0.0, observation) if failures else observation
+        action, agent_state = agent.predict(seen, agent_state, first, True)
         first = later
         if failures:
             action = np.where(failed[:, None], 0.0, action)
         observation, _, ended, _, info = env.step(action)
         metrics.add(sums, info, estimate(), failed)
-        failed = ended.astype(np.bool_, copy=False)
+        failed = failed | ended | ~(np.abs(observation) < _DIVERGED).all(axis=1)
         trace.record(k, info, estimate())
         if k % 100 == 0:
             progress(100)
