@@ -24,11 +24,8 @@ from smo_gym.validation import unknown
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
-ARMS: dict[str, dict[str, tuple[str, ...]]] = {
-    "smo": {"on": ("with",), "off": ("without",), "both": ("without", "with")},
-    "theorem": {"on": ("theorem",), "off": ("theorem",), "both": ("theorem",)},
-    "oracle": {"on": ("oracle",), "off": ("oracle",), "both": ("oracle",)},
-}
+OBSERVERS = ("smo", "theorem", "oracle")
+COMPENSATION = {"on": ("with",), "off": ("without",), "both": ("without", "with")}
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -42,7 +39,6 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--scenario",
         type=one_of("scenario", (*SCENARIOS, "all")),
         nargs="+",
-        default=["all"],
         help="regulation (Table 4), initial-conditions (Table 5), tracking (Table 7) or all (default)",
     )
     add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
@@ -57,15 +53,14 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
     add(
         "--observer",
-        type=one_of("observer", (*ARMS, "all")),
+        type=one_of("observer", (*OBSERVERS, "all")),
         default="smo",
         help="smo (default), theorem (gains designed for it), oracle (the true state) or all",
     )
     add(
         "--compensation",
-        type=one_of("compensation", ("on", "off", "both")),
-        default="both",
-        help="on, off or both (default)",
+        type=one_of("compensation", tuple(COMPENSATION)),
+        help="of the observer smo: on, off or both (default)",
     )
     add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
     return parser.parse_args(arguments)
@@ -108,7 +103,9 @@ def fraction(text: str) -> float:
 
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
     """The chosen scenarios, with the levels of the command line."""
-    names = SCENARIOS if "all" in arguments.scenario else dict.fromkeys(arguments.scenario)
+    if arguments.config and arguments.scenario:
+        raise ValueError(f"--scenario {' '.join(arguments.scenario)} and --config {arguments.config}: give one of them")
+    names = SCENARIOS if "all" in (arguments.scenario or ["all"]) else dict.fromkeys(arguments.scenario)
     paths = [arguments.config] if arguments.config else [CONFIGS / f"{name}.yaml" for name in names]
     found = [scenario.load(path) for path in paths]
     if arguments.uncertainty is not None:
@@ -131,6 +128,20 @@ def chosen(scenarios: Sequence[scenario.Scenario], controller: str) -> list[str]
     return found
 
 
+def chosen_arms(observer: str, compensation: str | None) -> list[str]:
+    """The arms of the comparison.
+
+    Raises:
+        ValueError: compensation is asked of an observer that has no such switch.
+    """
+    if observer in ("theorem", "oracle"):
+        if compensation is not None:
+            raise ValueError(f"--compensation {compensation} is for the observer smo, not --observer {observer}")
+        return [observer]
+    others = OBSERVERS[1:] if observer == "all" else ()
+    return [*COMPENSATION[compensation or "both"], *others]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     args = parse(arguments)
@@ -138,8 +149,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         scenarios = load(args)
         controllers = chosen(scenarios, args.controller)
-        observers = tuple(ARMS) if args.observer == "all" else (args.observer,)
-        arms = [arm for observer in observers for arm in ARMS[observer][args.compensation]]
+        arms = chosen_arms(args.observer, args.compensation)
         groups = study.groups(scenarios, controllers, arms, args.runs)
         out = files.prepare(args.out)
     except ValueError as error:
@@ -175,6 +185,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     files.write(out / "runs.csv", tables.runs_csv(outcomes))
     files.write(out / "tables.md", tables.render(numbers, "github", rms=True) + f"\n## Diagnostics\n\n{notes}\n")
     files.write(out / "tables.tex", tables.render(numbers, "latex_booktabs", rms=True))
+    for one in scenarios:
+        if (reference := one.trajectory()) is not None:
+            files.write(out / "reference.json", reference.to_json() + "\n")
     files.write(out / "settings.yaml", yaml.safe_dump(resolved, sort_keys=False))
     print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {out}")
     return 0

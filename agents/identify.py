@@ -1,11 +1,12 @@
 """Recover what the article does not print from what it does.
 
-    python agents/identify.py                        # LQR weights (R = 1) and observer slopes, Table 5's LQR cells
-    python agents/identify.py --target smc           # k1..k4 and slopes, Table 5's SMC cells
-    python agents/identify.py --target tracking      # k1..k4, Table 7's averages
+    python agents/identify.py                        # LQR weights (R = 1) and observer slopes: Table 5's LQR cells
+    python agents/identify.py --target regulation    # SMC's k1..k4 and slope, Table 4's x(0): Tables 4 and 5
+    python agents/identify.py --target tracking      # SMC's k1..k4 of tracking: Table 7's averages
 
-CMA-ES from random starts. The state is saved after every generation: run the same command again to go on after an
-interruption. Writes report.md and report.json. Needs the extra "reference" (cma).
+CMA-ES from random starts; then from the best point under each hypothesis to reject. The state is saved after every
+generation: run the same command again to go on after an interruption. Writes report.md and report.json. Needs the extra
+"reference" (cma).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import json
 import math
 import pickle
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 from smo_gym.evaluation import files, scenario
-from smo_gym.evaluation.identification import Hypothesis, Problem, Search, Table5, Table7, cost, profile
+from smo_gym.evaluation.identification import Hypothesis, Problem, Search, cost, profile
+from smo_gym.evaluation.problems import Lqr, Regulation, Tracking
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 FACTORS = (0.8, 0.9, 1.1, 1.25)
@@ -35,10 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
     )
     add = parser.add_argument
-    add("--target", choices=("lqr", "smc", "tracking"), default="lqr", help="default %(default)s")
+    add("--target", choices=tuple(PROBLEMS), default="lqr", help="default %(default)s")
     add("--restarts", type=int, default=2, metavar="N", help="random starts (default 2)")
     add("--generations", type=int, default=80, metavar="N", help="of each search (default 80)")
-    add("--refit", type=int, default=10, metavar="N", help="generations for each rejected hypothesis (default 10)")
+    add("--refit", type=int, default=20, metavar="N", help="generations for each rejected hypothesis (default 20)")
     add("--seed", type=int, default=0, help="of the first start (default 0)")
     add("--out", type=Path, default=Path("identification"), metavar="DIR", help="default %(default)s")
     args = parser.parse_args(arguments)
@@ -46,25 +48,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if min(args.restarts, args.generations) < 1 or min(args.refit, args.seed) < 0:
             raise ValueError("--restarts and --generations must be at least 1, --refit and --seed at least 0")
-        problem = target(args.target)
+        problem = PROBLEMS[args.target]()
         out = files.prepare(args.out)
         searches = resume(out / "state.pkl", plan, problem) or [
-            *(Search(problem, Hypothesis(), args.seed + i) for i in range(args.restarts)),
-            *(Search(problem, alternative, args.seed) for alternative in problem.alternatives if args.refit),
+            Search(problem, Hypothesis(), args.seed + i) for i in range(args.restarts)
         ]
     except (ValueError, ImportError) as error:
         print(f"identify.py: error: {error}", file=sys.stderr)
         return 2
-    wanted = [args.generations if search.hypothesis == Hypothesis() else args.refit for search in searches]
+    total = args.restarts * args.generations + args.refit * len(problem.alternatives)
     done = sum(search.generations for search in searches)
     try:
-        with tqdm(total=sum(wanted), initial=done, desc="generations", leave=False, disable=None) as bar:
-            for search, generations in zip(searches, wanted, strict=True):
+        with tqdm(total=total, initial=done, desc="generations", leave=False, disable=None) as bar:
+
+            def run(search: Search, generations: int) -> None:
                 while search.generations < generations:
                     search.step()
                     files.write_bytes(out / "state.pkl", pickle.dumps((plan, searches)))
                     bar.set_postfix_str(f"{search.hypothesis.name}: RMS {100 * search.rms:.1f} %")
                     bar.update()
+
+            for search in searches[: args.restarts]:
+                run(search, args.generations)
+            best = min(searches[: args.restarts], key=lambda search: search.rms).best
+            if len(searches) == args.restarts and args.refit:
+                searches += [Search(problem, rival, args.seed, best) for rival in problem.alternatives]
+            for search in searches[args.restarts :]:
+                run(search, args.refit)
     except KeyboardInterrupt:
         print(f"identify.py: interrupted; the same command goes on from {out / 'state.pkl'}", file=sys.stderr)
         return 130
@@ -75,11 +85,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def target(name: str) -> Problem:
-    """The published numbers to fit."""
-    if name == "tracking":
-        return Table7(scenario.load(CONFIGS / "tracking.yaml"))
-    return Table5(scenario.load(CONFIGS / "initial-conditions.yaml"), name)
+def config(name: str) -> scenario.Scenario:
+    """A scenario of ``configs/``."""
+    return scenario.load(CONFIGS / f"{name}.yaml")
+
+
+PROBLEMS: dict[str, Callable[[], Problem]] = {
+    "lqr": lambda: Lqr(config("initial-conditions")),
+    "regulation": lambda: Regulation(config("initial-conditions"), config("regulation")),
+    "tracking": lambda: Tracking(config("tracking")),
+}
 
 
 def resume(path: Path, plan: dict[str, Any], problem: Problem) -> list[Search] | None:
@@ -130,7 +145,7 @@ def report(problem: Problem, searches: Sequence[Search]) -> tuple[str, dict[str,
     ]
     if rejected:
         spent = max(s.generations for s in searches if s.hypothesis != Hypothesis())
-        header = ("", "same settings", f"refitted, {spent} generations from a random start")
+        header = ("", "same settings", f"refitted, {spent} generations from them")
         parts.append("## Rejected hypotheses: RMS in percent")
         parts.append(tabulate(rejected, header, tablefmt="github", disable_numparse=True))
     data = {

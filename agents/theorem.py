@@ -2,8 +2,9 @@
 
     python agents/theorem.py
 
-Prints (28), (30) and (31) for the printed and for designed gains over a declared operating set, then runs both
-observers on the same random plants, then shows where (51) and (52) fail.
+Prints (28), (30) and (31) for the printed and for designed gains over a declared operating set and along the runs of
+Table 5, then runs both observers on the same random plants, then shows where (51) and (52) fail. Put `gains` into a
+settings file (--config) to see those of your own beside them.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from tqdm import tqdm
 from smo_gym import CartPendulum, Gains, SlidingModeController, VectorObserverWrapper, theorem
 from smo_gym.evaluation import rollout, scenario
 from smo_gym.evaluation.convergence import Convergence, converge
+from smo_gym.evaluation.rollout import Traces
 from smo_gym.evaluation.scenario import Scenario, TheoremSettings
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
@@ -49,9 +51,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     article = scenario.load(CONFIGS / "initial-conditions.yaml")
     gains = {"printed, LQR": Gains.of("lqr"), "printed, SMC": Gains.of("smc"), "designed": Gains.of(observer.gains)}
+    if settings.gains is not None:
+        gains["your own"] = Gains.of(settings.gains.value)
     gain_conditions(gains, over)
+    epsilon_1, epsilon_2 = theorem.initial_errors(settings.starts.value, observer.xhat0)
     print(
-        f"\nThe designed observer wants a step of {1e3 * (observer.step or DT):.3g} ms with slopes {observer.slopes}.\n"
+        f"\nOver the box of starts (36) and (37) hold for epsilon_1 > ({pair(epsilon_1)}) and epsilon_2 > "
+        f"({pair(epsilon_2)})."
+    )
+    print(
+        f"The designed observer wants a step of {1e3 * (observer.step or DT):.3g} ms with slopes {observer.slopes}.\n"
     )
     rng = np.random.default_rng(args.seed)
     low, high = np.array(settings.starts.value)
@@ -65,12 +74,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
             over,
             starts,
             plants,
+            force=settings.force.value,
             horizon=settings.horizon.value,
             settle=settings.settle.value,
             progress=bar.update,
         )
     runs(found, settings)
-    switching(article)
+    traces = {name: along(article, name) for name in article.controllers}
+    trajectories(article, traces)
+    switching(article, traces["smc"])
     return 0
 
 
@@ -95,8 +107,11 @@ def runs(found: Convergence, settings: TheoremSettings) -> None:
     stayed, total = found.tested, len(found.stayed)
     n, inside = int(stayed.sum()), int(found.kept[stayed].sum())
     bounds = ", ".join(f"{value:.2f}" for value in found.largest)
-    print(f"Largest |theta|, |h'|, |theta'| and estimates of these: {bounds}.")
-    print(f"{n} of {total} runs stayed in the operating set and outlasted t0; {total - n} did not and are not counted.")
+    print(f"Largest |theta|, |h'|, |theta'|, estimates of these, and |u|: {bounds}.")
+    print(
+        f"{n} of {total} runs stayed in the operating set, with |u| <= {settings.force.value:g} N, and outlasted t0; "
+        f"{total - n} did not and are not counted."
+    )
     if not n:
         return
     interval = stats.binomtest(inside, n).proportion_ci(method="wilson")
@@ -131,23 +146,52 @@ def runs(found: Convergence, settings: TheoremSettings) -> None:
     print(tabulate(rms, title, disable_numparse=True), "\n")
 
 
-def switching(article: Scenario) -> None:
-    """(51) and (52) along SMC runs of Table 5's cases on the nominal plant."""
-    settings = article.controllers["smc"]
-    law = settings.build(DT)
-    assert isinstance(law, SlidingModeController)
-    cases = article.initial_states.value
+def along(article: Scenario, controller: str) -> Traces:
+    """Runs of Table 5's cases on the nominal plant, with compensation."""
+    settings, cases = article.controllers[controller], article.initial_states.value
     env = gymnasium.make_vec("SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.options)
-    plants = np.repeat(CartPendulum().as_array()[None], len(cases), axis=0)
     observed = VectorObserverWrapper(env, settings.observer.build(compensation=True))
-    result = rollout(observed, law, options={"state": np.array(list(cases.values())), "params": plants}, trace_every=1)
+    plants = np.repeat(CartPendulum().as_array()[None], len(cases), axis=0)
+    options = {"state": np.array(list(cases.values())), "params": plants}
+    result = rollout(observed, settings.build(DT), options=options, trace_every=1)
     assert result.traces is not None
+    return result.traces
+
+
+def trajectories(article: Scenario, traces: dict[str, Traces]) -> None:
+    """(28), (30) and (31) along runs of Table 5's cases."""
     rows = []
-    for i, case in enumerate(cases):
-        push, needed = theorem.controllability(law, result.traces.xhat[:, :, i].T)
+    for name, runs in traces.items():
+        gains = Gains.of(article.controllers[name].observer.gains.value)
+        for i, case in enumerate(article.initial_states.value):
+            bounds = theorem.suprema_along(runs.x[:, :, i].T, runs.xhat[:, :, i].T, CartPendulum())
+            checked = theorem.conditions(gains, bounds)
+            verdicts = [f"{pair(one.supremum)} ({' '.join(map(said, one.by_row))})" for one in checked]
+            rows.append((f"{name.upper()}, case {case}", *verdicts))
+    names = ("(28): sup |X2| (row by row)", "(30): sup of the drift's error", "(31): sup of the gain's error")
+    print(tabulate(rows, ("Table 5, nominal plant", *names), disable_numparse=True), "\n")
+
+
+def switching(article: Scenario, traces: Traces) -> None:
+    """(51) and (52) along SMC runs of Table 5's cases on the nominal plant."""
+    law = article.controllers["smc"].build(DT)
+    assert isinstance(law, SlidingModeController)
+    rows = []
+    for i, case in enumerate(article.initial_states.value):
+        push, needed = theorem.controllability(law, traces.xhat[:, :, i].T)
         share = f"{100 * np.mean(push > needed):.2f} %"
-        rows.append((f"case {case}", f"{np.median(push):.2g}", f"{push.max():.3g}", f"{needed.min():.3g}", share))
-    header = ("SMC, Table 5", "|ds/dx g| Z0, median", "largest", "|ds/dx f| + lambda, least", "(52) holds for")
+        least = f"{push[1:].min() / law.Z0:.1g}"  # at the very start xhat = 0
+        rows.append(
+            (f"case {case}", least, f"{np.median(push):.2g}", f"{push.max():.3g}", f"{needed.min():.3g}", share)
+        )
+    header = (
+        "SMC, Table 5",
+        "(51): least |ds/dx g|",
+        "(52): |ds/dx g| Z0, median",
+        "largest",
+        "|ds/dx f| + lambda, least",
+        "holds for",
+    )
     print(tabulate(rows, header, disable_numparse=True))
     print("\ns is a sum of squares: its gradient vanishes on s = 0, where (52) would ask 0 > lambda + delta.")
 

@@ -98,6 +98,17 @@ def suprema(over: OperatingSet) -> Suprema:
     )
 
 
+def initial_errors(starts: ArrayLike, xhat0: ArrayLike) -> tuple[Array, Array]:
+    """epsilon_1 and epsilon_2 of (36)-(37), row by row (2,) each: the largest |x(0) - xhat(0)| over a box of x(0).
+
+    Args:
+        starts: [low, high], (2, 4).
+        xhat0: xhat(0), (4,).
+    """
+    largest = np.abs(np.asarray(starts) - np.asarray(xhat0)).max(axis=0)
+    return largest[:2], largest[2:]
+
+
 def suprema_along(x: Array, xhat: Array, plant: CartPendulum, model: CartPendulum | None = None) -> Suprema:
     """The suprema along one measured trajectory, states and estimates (4, m)."""
     model = model or CartPendulum()

@@ -86,6 +86,7 @@ def test_everything_that_was_promised_is_written(both_tables):
         "tables.md",
         "tables.tex",
         "settings.yaml",
+        "reference.json",
     }
     assert "| average" in (out / "tables.md").read_text()
     assert r"\toprule" in (out / "tables.tex").read_text()
@@ -130,6 +131,19 @@ def test_options_choose_arms_levels_and_files(tmp_path):
     assert {row["compensation"] for row in read(tmp_path / "b" / "results.csv")} == {"oracle", "theorem", "with"}
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--observer", "oracle", "--compensation", "on"), "--compensation on is for the observer smo"),
+        (("--scenario", "tracking", "--config", "own.yaml"), "give one of them"),
+    ],
+)
+def test_options_that_contradict_each_other_are_named(tmp_path, options, message):
+    done = evaluate(*options, check=False, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+
+
 def test_failed_runs_are_shown(tmp_path):
     config = small_scenario(
         tmp_path, horizon={"value": 3.0, "source": "chosen"}, track_limit={"value": 0.9, "source": "chosen"}
@@ -155,6 +169,12 @@ def test_the_theorems_gains_are_an_arm_of_their_own(tmp_path):
     }
     assert error["oracle"] == 0.0
     assert 0.0 < error["theorem"] < 0.5 * error["with"]
+    assert "0 of 8" in (tmp_path / "out" / "tables.md").read_text()  # in the column of those that left the set
+    tight = yaml.safe_load((ROOT / "configs" / "article.yaml").read_text())["designed"]
+    tight["operating_set"]["speed"]["value"] = [0.1, 0.1]
+    config = small_scenario(tmp_path, horizon={"value": 0.5, "source": "chosen"}, designed=tight)
+    done = evaluate("--config", config, "--controller", "lqr", "--runs", "2", "--observer", "theorem", cwd=tmp_path)
+    assert "8 of 8" in done.stdout
     without = small_scenario(tmp_path, designed=None)
     done = evaluate("--config", without, "--observer", "theorem", check=False, cwd=tmp_path)
     assert done.returncode == 2

@@ -29,13 +29,15 @@ def test_metrics_are_those_of_a_plain_loop(closed_loop):
     for slot in range(3):
         env = smo_gym.ObserverWrapper(gymnasium.make("SMOPendulum-v0", horizon=2.0, control_period=0.004))
         observation, info = env.reset(seed=slot)
-        positions, errors, forces = [], [], [0.0]
+        positions, errors, forces, states, estimates = [], [], [0.0], [], []
         truncated = False
         while not truncated:
             observation, _, _, truncated, info = env.step(LQR(K).predict(observation)[0])
             positions += [*info["samples"]]
             errors.append(observation[2:] - info["state"])
             forces.append(info["force"])
+            states.append(info["state"])
+            estimates.append(observation[2:])
         h, theta = np.array(positions).T
         rms = np.sqrt(np.mean(np.square(errors), axis=0))
         expected = {
@@ -47,6 +49,14 @@ def test_metrics_are_those_of_a_plain_loop(closed_loop):
             "peak_h": np.abs(h).max(),
             "peak_theta": np.abs(theta).max(),
             "peak_force": np.abs(forces).max(),
+            **dict(zip(("peak_h_dot", "peak_theta_dot"), np.abs(states).max(axis=0)[2:], strict=True)),
+            **dict(
+                zip(
+                    ("peak_estimate_theta", "peak_estimate_h_dot", "peak_estimate_theta_dot"),
+                    np.abs(estimates).max(axis=0)[1:],
+                    strict=True,
+                )
+            ),
             "duration": 2.0,
         }
         assert result.metrics.keys() == expected.keys()
@@ -102,6 +112,7 @@ def test_without_an_observer_there_is_no_estimation_error(closed_loop):
 
     result = closed_loop(2, Still(), observed=False)
     assert np.isnan(result.metrics["estimation_rms_h"]).all()
+    assert np.isnan(result.metrics["peak_estimate_theta"]).all()
     assert (result.metrics["effort"] == 0.0).all()
 
 

@@ -10,16 +10,21 @@ import numpy as np
 import pytest
 
 from smo_gym.evaluation import scenario
-from smo_gym.evaluation.identification import ALTERNATIVES, Hypothesis, Table5, Table7, cost, profile
+from smo_gym.evaluation.identification import Hypothesis, Search, cost, profile
+from smo_gym.evaluation.problems import Lqr, Regulation, Tracking
 
 ROOT = Path(__file__).resolve().parent.parent
 KNOWN = np.log10([51.8, 57.4, 59.3, 0.284, 12.5, 12.5])
 pytest.importorskip("cma")
 
 
+def config(name):
+    return scenario.load(ROOT / "configs" / f"{name}.yaml")
+
+
 @pytest.fixture(scope="module")
 def problem():
-    return Table5(scenario.load(ROOT / "configs" / "initial-conditions.yaml"), "lqr")
+    return Lqr(config("initial-conditions"))
 
 
 def rms(problem, hypothesis):
@@ -29,7 +34,7 @@ def rms(problem, hypothesis):
 def test_the_settings_in_configs_fit_and_the_alternatives_do_not(problem):
     ours = rms(problem, Hypothesis())
     assert ours < 0.03
-    for alternative in ALTERNATIVES:
+    for alternative in problem.alternatives:
         assert rms(problem, alternative) > 3 * ours, alternative.name
 
 
@@ -45,18 +50,32 @@ def test_the_profile_rises_away_from_the_optimum(problem):
     assert (around[:3] > rms(problem, Hypothesis())).all()
 
 
-def test_the_settings_in_configs_fit_table_5_under_smc():
-    smc = Table5(scenario.load(ROOT / "configs" / "initial-conditions.yaml"), "smc")
-    point = np.log10([1.4, 3.4, 3.3, 0.8, 33.3, 12.5, 12.5])
-    worse = np.log10([1.4, 3.4, 2.0, 0.8, 33.3, 12.5, 12.5])
-    here, there = cost(smc, np.array([point, worse]), Hypothesis())
-    assert here < 0.1 < 0.2 < there
+def test_the_settings_in_configs_fit_tables_4_and_5_under_smc():
+    problem = Regulation(config("initial-conditions"), config("regulation"))
+    assert len(problem.labels()) == 24
+    point = np.log10([1.4, 3.4, 3.3, 0.8, 33.3, 1.52, 1.18, 0.14, 0.2])
+    other_k3, other_h = point.copy(), point.copy()
+    other_k3[2], other_h[5] = np.log10([2.0, 1.0])
+    off = problem.deviations(np.array([point, other_k3, other_h]), Hypothesis())
+    here, there, elsewhere = np.sqrt(np.mean(off**2, axis=1))
+    assert here < 0.11 < 0.2 < there
+    assert elsewhere > 0.2
+    assert (off[0, :16] == off[2, :16]).all()  # Table 4's x(0) is nothing to Table 5
 
 
 def test_the_settings_in_configs_fit_table_7():
-    tracking = Table7(scenario.load(ROOT / "configs" / "tracking.yaml"))
-    here, there = cost(tracking, np.log10([[2.5, 2.4, 2.7, 0.86], [1.4, 3.4, 3.3, 0.8]]), Hypothesis())
+    tracking = Tracking(config("tracking"))
+    ours = np.log10([[2.5, 2.4, 2.7, 0.86], [1.4, 3.4, 3.3, 0.8]])
+    here, there = cost(tracking, ours, Hypothesis())
     assert here < 0.15 < there
+    assert cost(tracking, ours[:1], Hypothesis(estimate_starts_at_truth=True))[0] > 2 * here
+
+
+def test_a_search_begins_where_it_is_told(problem):
+    search = Search(problem, Hypothesis(), 0, KNOWN)
+    search.step()
+    assert search.rms < 0.1
+    np.testing.assert_allclose(search.best, KNOWN, atol=0.3)
 
 
 def identify(out, *options):

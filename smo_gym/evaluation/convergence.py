@@ -22,7 +22,8 @@ Array = NDArray[np.float64]
 class Convergence:
     """What n runs showed of the first observer, and of all of them.
 
-    A run counts as staying while its state and the first observer's estimate are in the operating set.
+    A run counts as staying while its state and the first observer's estimate are in the operating set, and its force
+    within the declared one.
     """
 
     stayed: NDArray[np.bool_]
@@ -38,7 +39,7 @@ class Convergence:
     velocity_rms: dict[str, Array]
     """RMS errors of h' and theta' over all runs that stayed, after the settling time, observer by observer, (2,)."""
     largest: Array
-    """Largest |theta|, |h'|, |theta'| and their estimates over all runs, (6,)."""
+    """Largest |theta|, |h'|, |theta'|, their estimates and |u| over all runs, (7,)."""
     horizon: float
     """Of the runs in s: what was promised for later was not tested."""
 
@@ -60,6 +61,7 @@ def converge(
     starts: Array,
     plants: Array,
     *,
+    force: float,
     horizon: float,
     settle: float,
     dt: float = 0.001,
@@ -73,6 +75,7 @@ def converge(
         over: the operating set, whose suprema give kappa_1, kappa_2 and the layer.
         starts: x(0), (n, 4).
         plants: [M_c, m, l, g], (n, 4).
+        force: that the observers' steps are stable up to, in N.
         horizon: of the runs in s.
         settle: where the RMS of the velocity errors begins, in s.
         dt: sampling and control period in s.
@@ -95,7 +98,7 @@ def converge(
         track_limit=None,
     )
     y, info = env.reset(options={"state": starts, "params": plants})
-    estimators: dict[str, Any] = {name: o.start(n, dt, 30.0, over.model) for name, o in observers.items()}
+    estimators: dict[str, Any] = {name: o.start(n, dt, force, over.model) for name, o in observers.items()}
     first, watched = next(iter(observers)), next(iter(estimators.values()))
     gains: Any = observers[first].gains
     bounds = suprema(over)
@@ -105,7 +108,7 @@ def converge(
     promised_velocity = np.full((2, n), np.nan)
     stayed = over.holds(x, watched.xhat)
     reached, velocity_error = np.zeros((2, n)), np.full((2, n), np.nan)
-    largest = np.abs(np.concatenate([x[1:], watched.xhat[1:]])).max(axis=1)
+    largest = np.zeros(7)
     squares, count = {name: np.zeros((2, n)) for name in observers}, 0
     for k in range(1, steps + 1):
         action, _ = agent.predict(np.concatenate([y, watched.xhat.T], axis=1))
@@ -116,8 +119,9 @@ def converge(
         for estimator in estimators.values():
             estimator.update(Period(y_before, samples, info["force"], x))
         xhat = watched.xhat
-        stayed &= over.holds(x, xhat)
-        largest = np.maximum(largest, np.abs(np.concatenate([x[1:], xhat[1:]])).max(axis=1))
+        u = info["force"]
+        stayed &= over.holds(x, xhat) & (np.abs(u) <= force)
+        largest = np.maximum(largest, np.abs(np.concatenate([x[1:], xhat[1:], u[None]])).max(axis=1))
         reached = np.where(np.abs(x[:2] - xhat[:2]) > half, time, reached)
         error = np.abs(x[2:] - xhat[2:])
         at_t0 = np.isnan(promised_velocity) & (time >= promised)

@@ -21,14 +21,17 @@ NAMES = (
     "peak_h",  # largest |h - h_d| at a sampling instant, m
     "peak_theta",  # the same of theta, rad
     "peak_force",  # largest |u|, N
+    "peak_h_dot",  # largest |h'| at a control instant, m/s
+    "peak_theta_dot",  # the same of theta', rad/s
+    *(f"peak_estimate_{name}" for name in STATE_NAMES[1:]),  # largest |xhat| of these; NaN without observer
     "duration",  # until the horizon or the failure, s
 )
-_PREVIOUS_FORCE, _SAMPLES, _PERIODS = 11, 12, 13
+_PREVIOUS_FORCE, _SAMPLES, _PERIODS = 16, 17, 18
 
 
 def start(n: int) -> Array:
     """Sums of n runs at their beginning."""
-    return np.zeros((14, n))
+    return np.zeros((19, n))
 
 
 def add(sums: Array, info: dict[str, Any], xhat: Array, over: NDArray[np.bool_]) -> None:
@@ -44,7 +47,7 @@ def finish(sums: Array, control_period: float) -> dict[str, Array]:
         *(sums[:2] / sums[_SAMPLES]),
         *np.sqrt(sums[2:6] / periods),
         sums[6] * control_period,
-        *sums[7:11],
+        *sums[7:16],
         periods * control_period,
     ]
     return dict(zip(NAMES, values, strict=True))
@@ -67,6 +70,12 @@ def _add(sums: Array, deviation: Array, x: Array, xhat: Array, u: Array, over: N
         sums[6, i] += u[i] * u[i]
         sums[7, i] += abs(u[i] - sums[_PREVIOUS_FORCE, i])
         sums[10, i] = max(sums[10, i], abs(u[i]))
+        sums[11, i] = max(sums[11, i], abs(x[i, 2]))
+        sums[12, i] = max(sums[12, i], abs(x[i, 3]))
+        for j in range(1, 4):
+            estimate = abs(xhat[i, j])
+            if not estimate <= sums[12 + j, i]:  # NaN too is kept
+                sums[12 + j, i] = estimate
         sums[_PREVIOUS_FORCE, i] = u[i]
         sums[_SAMPLES, i] += deviation.shape[1]
         sums[_PERIODS, i] += 1.0

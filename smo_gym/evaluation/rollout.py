@@ -109,7 +109,7 @@ def rollout(
             action = np.where(failed[:, None], 0.0, action)
         observation, _, ended, _, info = env.step(action)
         metrics.add(sums, info, estimate(), failed)
-        failed = failed | ended | ~(np.abs(observation) < _DIVERGED).all(axis=1)
+        failed = failed | ended.astype(np.bool_, copy=False) | ~(np.abs(observation) < _DIVERGED).all(axis=1)
         trace.record(k, info, estimate())
         if k % 100 == 0:
             progress(100)

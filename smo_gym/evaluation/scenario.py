@@ -12,7 +12,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..controllers import LQR, SlidingModeController
-from ..observers import SlidingModeObserver
+from ..observers import Gains, SlidingModeObserver
 from ..plant import CartPendulum
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
 from ..theorem import OperatingSet, design, stable
@@ -123,6 +123,7 @@ class TheoremSettings(DesignSettings):
     starts: Setting[tuple[Four, Four]]
     horizon: Setting[float]
     settle: Setting[float]
+    gains: Setting[dict[str, tuple[float, float]]] | None = None
 
     @model_validator(mode="after")
     def _check(self) -> TheoremSettings:
@@ -131,6 +132,8 @@ class TheoremSettings(DesignSettings):
             raise ValueError(f"starts: low={low} is above high={high}: the set of initial states holds no point")
         if not 0.0 <= self.settle.value < self.horizon.value:
             raise ValueError(f"settle={self.settle.value} must lie between 0 and horizon={self.horizon.value}")
+        if self.gains is not None:
+            Gains.of(self.gains.value)
         return self
 
 

@@ -14,6 +14,8 @@ from ..article import Cell, published
 from .study import ARMS, Outcome
 
 Array = NDArray[np.float64]
+# A cell of the article is a mean of so many runs.
+_PRINTED_RUNS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +30,8 @@ class Result:
     median: float
     runs: int
     failures: int
+    half_width: float = math.nan
+    """Of the 95 % prediction interval around ``measured`` for a mean of ten further runs, which a printed cell is."""
 
     @property
     def deviation(self) -> float:
@@ -98,6 +102,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
         median=float(np.median(values[complete])) if complete.any() else math.nan,
         runs=len(values),
         failures=int(np.count_nonzero(~complete)),
+        half_width=_prediction(values[complete]),
     )
     if not any(known.table == cell.table and known.metric == "rms" for known in published()):
         return [mse]
@@ -110,6 +115,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
         ci_low=math.sqrt(mse.ci_low),
         ci_high=math.sqrt(mse.ci_high),
         median=math.sqrt(mse.median),
+        half_width=math.nan,
     )
     return [mse, rms]
 
@@ -157,6 +163,14 @@ def _reduction(rows: Sequence[Outcome], state: str, uncertainty: str, case: str)
 
 def _mean(values: Array) -> float:
     return float(np.mean(values)) if values.size else math.nan
+
+
+def _prediction(values: Array) -> float:
+    """Half-width of the 95 % prediction interval for a mean of ten further runs, Student's."""
+    n = values.size
+    if n < 2:
+        return math.nan
+    return float(stats.t.ppf(0.975, n - 1) * values.std(ddof=1) * math.sqrt(1.0 / n + 1.0 / _PRINTED_RUNS))
 
 
 def _interval(values: Array) -> tuple[float, float]:

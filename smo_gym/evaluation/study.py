@@ -11,7 +11,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from ..plant import CartPendulum
+from ..plant import STATE_NAMES, CartPendulum
 from ..wrappers import VectorObserverWrapper
 from .rollout import rollout
 from .scenario import ControllerSettings, Scenario
@@ -52,6 +52,19 @@ class Outcome:
     """Metric name to values (runs,)."""
     failed: NDArray[np.bool_]
     """(runs,)."""
+
+    @property
+    def left(self) -> NDArray[np.bool_] | None:
+        """Which runs left the operating set that the theorem's gains are designed for, (runs,); None in other arms."""
+        designed = self.group.scenario.designed
+        if self.group.arm != "theorem" or designed is None:
+            return None
+        zero = np.zeros_like(self.metrics["peak_theta"])
+        x, xhat = (
+            np.array([zero, *(self.metrics[f"{peak}_{name}"] for name in STATE_NAMES[1:])])
+            for peak in ("peak", "peak_estimate")
+        )
+        return ~designed.over(CartPendulum()).holds(x, xhat) | (self.metrics["peak_force"] > designed.force.value)
 
 
 def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequence[str], runs: int) -> list[Group]:
