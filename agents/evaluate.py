@@ -2,7 +2,8 @@
 
     python agents/evaluate.py --controller all --scenario all
 
-Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and the resolved settings to --out.
+Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and the resolved settings to --out, and with
+--figures the article's Figures 3-17 as PDF and PNG to --out/figures.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from pathlib import Path
 import yaml
 from tqdm import tqdm
 
-from smo_gym.evaluation import files, scenario, study, tables
+from smo_gym.evaluation import figures, files, scenario, study, tables
 from smo_gym.evaluation.statistics import results
 from smo_gym.validation import unknown
 
@@ -62,6 +63,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         type=one_of("compensation", tuple(COMPENSATION)),
         help="of the observer smo: on, off or both (default)",
     )
+    add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
     return parser.parse_args(arguments)
 
@@ -151,8 +153,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         controllers = chosen(scenarios, args.controller)
         arms = chosen_arms(args.observer, args.compensation)
         groups = study.groups(scenarios, controllers, arms, args.runs)
+        drawn, left_out = figures.planned(groups) if args.figures else ([], [])
         out = files.prepare(args.out)
-    except ValueError as error:
+        pictures = files.prepare(out / "figures") if drawn else out
+    except (ValueError, ImportError) as error:
         print(f"evaluate.py: error: {error}", file=sys.stderr)
         return 2
     runs = sum(group.runs for group in groups)
@@ -166,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             leave=False,
             disable=None,
         ) as bar:
-            outcomes = study.measure(groups, args.seed, bar.update)
+            outcomes = study.measure(groups, args.seed, bar.update, figures.SAMPLES if drawn else None)
     except KeyboardInterrupt:
         print("evaluate.py: interrupted, nothing was written", file=sys.stderr)
         return 130
@@ -189,6 +193,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if (reference := one.trajectory()) is not None:
             files.write(out / "reference.json", reference.to_json() + "\n")
     files.write(out / "settings.yaml", yaml.safe_dump(resolved, sort_keys=False))
+    try:
+        for plan in tqdm(drawn, unit="figure", leave=False, disable=None):
+            figure = figures.draw(plan, outcomes, numbers)
+            for form in figures.FORMATS:
+                files.write_bytes(pictures / f"{plan.name}.{form}", figures.encode(figure, form))
+    except KeyboardInterrupt:
+        print(f"evaluate.py: interrupted while drawing; the tables are in {out}", file=sys.stderr)
+        return 130
+    if left_out:
+        print(f"\nno runs for Figure {', '.join(str(plan.number) for plan in left_out)}: not drawn")
     print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {out}")
     return 0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -10,6 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
+from ..envs.desired import Desired
 from ..envs.task import Task
 from . import metrics
 
@@ -34,7 +35,7 @@ class Agent(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Traces:
-    """Every ``every``-th control instant of a rollout, the start included."""
+    """Every so-manieth control instant of some slots of a rollout, the start included."""
 
     time: Array
     """s, (m,)."""
@@ -44,6 +45,14 @@ class Traces:
     """Estimates, (m, 4, n); NaN where the environment has no observer."""
     u: Array
     """Force in N over the control period that ended at ``time``, (m, n)."""
+    u_low: Array
+    """The least force in N since the instant before, (m, n): a force can chatter faster than what is kept of it."""
+    u_high: Array
+    """The largest, (m, n)."""
+    u_mean: Array
+    """The mean, (m, n): what such a force does to the cart."""
+    x_d: Array | None
+    """The reference, (m, 4), where there is one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +73,7 @@ def rollout(
     seed: int | None = None,
     options: Mapping[str, Any] | None = None,
     trace_every: int | None = None,
+    trace_slots: Sequence[int] | None = None,
     progress: Callable[[int], object] = lambda steps: None,
 ) -> Rollout:
     """Run every slot of a vector environment from reset to its horizon.
@@ -76,6 +86,7 @@ def rollout(
         seed: of the environment's reset.
         options: of the environment's reset, ``state`` and ``params`` to replay exact cases.
         trace_every: keep every so many control instants; None keeps none, and memory does not grow with time.
+        trace_slots: the slots to keep them of; None for all.
         progress: called with the number of control periods done since the last call.
 
     Raises:
@@ -95,7 +106,7 @@ def rollout(
     def estimate() -> Array:
         return observation[:, -4:] if observed else np.full((n, 4), np.nan)
 
-    trace = _Recorder(trace_every, task.control_period)
+    trace = _Recorder(trace_every, trace_slots, task)
     trace.record(0, info, estimate())
     failed: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
     first, agent_state = np.ones(n, dtype=np.bool_), None
@@ -121,16 +132,31 @@ def rollout(
 
 
 class _Recorder:
-    def __init__(self, every: int | None, period: float) -> None:
-        self._every, self._period = every, period
-        self._rows: list[tuple[float, Array, Array, Array]] = []
+    def __init__(self, every: int | None, slots: Sequence[int] | None, task: Task) -> None:
+        self._every, self._task = every, task
+        self._slots = slice(None) if slots is None else np.asarray(slots, dtype=np.intp)
+        self._rows: list[tuple[Array, ...]] = []
+        self._start()
+
+    def _start(self) -> None:
+        self._low, self._high, self._sum, self._periods = np.array(np.inf), np.array(-np.inf), np.array(0.0), 0
 
     def record(self, k: int, info: dict[str, Any], xhat: Array) -> None:
-        if self._every is not None and k % self._every == 0:
-            self._rows.append((k * self._period, info["state"].T, xhat.T, info["force"]))
+        if self._every is None:
+            return
+        u = info["force"][self._slots]
+        self._low, self._high = np.minimum(self._low, u), np.maximum(self._high, u)
+        self._sum, self._periods = self._sum + u, self._periods + 1
+        if k % self._every == 0:
+            time, x = np.array(k * self._task.control_period), info["state"][self._slots].T
+            mean = self._sum / self._periods
+            self._rows.append((time, x, xhat[self._slots].T, u, self._low, self._high, mean))
+            self._start()
 
     def traces(self) -> Traces | None:
         if self._every is None:
             return None
-        time, x, xhat, u = (np.array(column) for column in zip(*self._rows, strict=True))
-        return Traces(time, x, xhat, u)
+        time, x, xhat, u, low, high, mean = (np.array(column) for column in zip(*self._rows, strict=True))
+        reference = self._task.reference
+        told = None if reference is None else Desired(self._task, reference).states[:: self._every][: len(time)]
+        return Traces(time, x, xhat, u, low, high, mean, told)

@@ -11,14 +11,17 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
+from ..envs.task import Task
 from ..plant import STATE_NAMES, CartPendulum
 from ..wrappers import VectorObserverWrapper
-from .rollout import rollout
+from .rollout import Traces, rollout
 from .scenario import ControllerSettings, Scenario
 
 Array = NDArray[np.float64]
 ARMS = ("without", "with", "theorem", "oracle")
 """Compensation of the input uncertainty off, on; gains designed for the theorem; the true state for an estimate."""
+TRACED_RUNS = 10
+"""Of each group at most so many runs are traced, the first ones: as many as the article shows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +55,8 @@ class Outcome:
     """Metric name to values (runs,)."""
     failed: NDArray[np.bool_]
     """(runs,)."""
+    traces: Traces | None = None
+    """Of its first :data:`TRACED_RUNS` runs, where :func:`measure` was asked for them."""
 
     @property
     def left(self) -> NDArray[np.bool_] | None:
@@ -101,7 +106,10 @@ def deviations(seed: int, runs: int) -> Array:
 
 
 def measure(
-    wanted: Sequence[Group], seed: int, progress: Callable[[float], object] = lambda seconds: None
+    wanted: Sequence[Group],
+    seed: int,
+    progress: Callable[[float], object] = lambda seconds: None,
+    samples: int | None = None,
 ) -> list[Outcome]:
     """Run all groups.
 
@@ -109,6 +117,8 @@ def measure(
         wanted: the groups; those that share environment, controller and kind of observer are one batch.
         seed: of the plants.
         progress: called with the simulated seconds (over all slots) done since the last call.
+        samples: trace the first runs of each group at about so many instants (at least so many, where an episode has
+            them, and fewer than twice as many); None traces nothing.
     """
     options = {group.scenario.title: group.scenario.options for group in wanted}
     batches: dict[Any, list[int]] = {}
@@ -119,7 +129,7 @@ def measure(
     outcomes: dict[int, Outcome] = {}
     for indices in batches.values():
         batch = [wanted[i] for i in indices]
-        found = _run(batch, options[batch[0].scenario.title], seed, progress)
+        found = _run(batch, options[batch[0].scenario.title], seed, progress, samples)
         outcomes.update(zip(indices, found, strict=True))
     return [outcomes[index] for index in range(len(wanted))]
 
@@ -135,14 +145,19 @@ def simulated_seconds(wanted: Iterable[Group]) -> float:
 
 
 def _run(
-    batch: Sequence[Group], options: dict[str, Any], seed: int, progress: Callable[[float], object]
+    batch: Sequence[Group],
+    options: dict[str, Any],
+    seed: int,
+    progress: Callable[[float], object],
+    samples: int | None,
 ) -> list[Outcome]:
     scenario, settings = batch[0].scenario, batch[0].settings
     n = sum(group.runs for group in batch)
     env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
         scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **options
     )
-    nominal: CartPendulum = env.unwrapped.task.params  # type: ignore[attr-defined]
+    task: Task = env.unwrapped.task  # type: ignore[attr-defined]
+    nominal = task.params
     draws = deviations(seed, max(group.runs for group in batch))
     dt = scenario.control_period.value
     states, plants, observers = [], [], []
@@ -157,15 +172,32 @@ def _run(
             plants.append(nominal.perturbed(group.uncertainty * draw).as_array())
             observers.append(observer)
     observed = VectorObserverWrapper(env, "oracle" if batch[0].arm == "oracle" else observers)
+    edges = np.cumsum([group.runs for group in batch])[:-1]
+    slots = [part[:TRACED_RUNS] for part in np.split(np.arange(n), edges)]
     result = rollout(
         observed,
         settings.build(dt),
         options={"state": np.array(states), "params": np.array(plants)},
+        trace_every=None if samples is None else max(task.steps // samples, 1),
+        trace_slots=np.concatenate(slots).tolist(),
         progress=lambda steps: progress(steps * dt * n),
     )
-    edges = np.cumsum([group.runs for group in batch])[:-1]
     failed = np.split(result.failed, edges)
     columns = {name: np.split(values, edges) for name, values in result.metrics.items()}
+    traces = _split(result.traces, [len(part) for part in slots])
     return [
-        Outcome(group, {name: parts[i] for name, parts in columns.items()}, failed[i]) for i, group in enumerate(batch)
+        Outcome(group, {name: parts[i] for name, parts in columns.items()}, failed[i], traces[i])
+        for i, group in enumerate(batch)
+    ]
+
+
+def _split(traces: Traces | None, sizes: Sequence[int]) -> Sequence[Traces | None]:
+    """Traces of all slots as one a group."""
+    if traces is None:
+        return [None] * len(sizes)
+    of_slots = (traces.x, traces.xhat, traces.u, traces.u_low, traces.u_high, traces.u_mean)
+    parts = (np.split(values, np.cumsum(sizes)[:-1], axis=-1) for values in of_slots)
+    return [
+        Traces(traces.time, x, xhat, u, low, high, mean, traces.x_d)
+        for x, xhat, u, low, high, mean in zip(*parts, strict=True)
     ]
