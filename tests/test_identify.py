@@ -71,6 +71,13 @@ def test_the_settings_in_configs_fit_table_7():
     assert cost(tracking, ours[:1], Hypothesis(estimate_starts_at_truth=True))[0] > 2 * here
 
 
+def test_only_printed_cells_can_be_fitted():
+    other = scenario.Setting[tuple[float, ...]](value=(0.05, 0.12), source="chosen")
+    tracking = config("tracking").model_copy(update={"uncertainty": other})
+    with pytest.raises(ValueError, match="the article has no cell .*uncertainty_percent='12'"):
+        Tracking(tracking)
+
+
 def test_a_search_begins_where_it_is_told(problem):
     search = Search(problem, Hypothesis(), 0, KNOWN)
     search.step()

@@ -108,11 +108,25 @@ def _against(measured: Array, printed: Sequence[Any]) -> Array:
     return np.where(np.isfinite(flat), np.log(flat / np.ravel(printed)), _DIVERGED)
 
 
+def _printed(cell: Cell) -> float:
+    """A published number.
+
+    Raises:
+        ValueError: the article prints no such cell.
+    """
+    try:
+        return published()[cell]
+    except KeyError:
+        raise ValueError(
+            f"the article has no cell {cell}: a scenario's levels and cases must be the printed ones"
+        ) from None
+
+
 def _averages(table: str, controller: str, levels: Sequence[float]) -> list[list[float]]:
     """Published column averages over levels, by arm and state."""
     return [
         [
-            float(np.mean([published()[Cell(table, controller, f"{100 * x:g}", "", "mse", s, arm)] for x in levels]))
+            float(np.mean([_printed(Cell(table, controller, f"{100 * x:g}", "", "mse", s, arm)) for x in levels]))
             for s in STATES
         ]
         for arm in ARMS
@@ -121,7 +135,7 @@ def _averages(table: str, controller: str, levels: Sequence[float]) -> list[list
 
 def _table5(controller: str, cases: Sequence[str]) -> list[Any]:
     """Published cells by case, arm and state."""
-    return [[[published()[Cell("5", controller, "", c, "mse", s, arm)] for s in STATES] for arm in ARMS] for c in cases]
+    return [[[_printed(Cell("5", controller, "", c, "mse", s, arm)) for s in STATES] for arm in ARMS] for c in cases]
 
 
 def _labels(first: Sequence[str]) -> list[str]:
@@ -132,6 +146,9 @@ class Lqr:
     """LQR weights (R = 1) and the observer's slopes, from Table 5's sixteen LQR cells.
 
     On the nominal plant: the level of uncertainty moves LQR's averages far less than the error of the fit.
+
+    Raises:
+        ValueError: a case of the scenario is not a printed one (the others' levels likewise).
     """
 
     parameters: ClassVar[dict[str, tuple[float, float]]] = {
@@ -150,6 +167,7 @@ class Lqr:
     def __init__(self, initial_conditions: Scenario) -> None:
         self.scenario = initial_conditions
         self._cases = initial_conditions.initial_states.value
+        self._cells = _table5("lqr", list(self._cases))
 
     def labels(self) -> list[str]:
         """Case, arm, state."""
@@ -170,7 +188,7 @@ class Lqr:
             starts,
             model.as_array()[None],
         )
-        return _against(mse.mean(axis=3), _table5("lqr", list(self._cases)))
+        return _against(mse.mean(axis=3), self._cells)
 
 
 class Regulation:
@@ -193,6 +211,8 @@ class Regulation:
     def __init__(self, initial_conditions: Scenario, regulation: Scenario) -> None:
         self.table5, self.table4 = initial_conditions, regulation
         self._cases = initial_conditions.initial_states.value
+        self._cells = _table5("smc", list(self._cases))
+        self._averages = [_averages("4", name, regulation.uncertainty.value) for name in ("smc", "lqr")]
 
     def labels(self) -> list[str]:
         """Table 5's cells, then Table 4's averages."""
@@ -214,15 +234,9 @@ class Regulation:
         table5 = _mse(self.table5, hypothesis, smc_observers, law, cases, _plants(self.table5, 6))
         with_smc = _mse(self.table4, hypothesis, smc_observers, law, x0, plants)
         with_lqr = _mse(self.table4, hypothesis, lqr_observers, lambda n: lqr.build(dt), x0, plants)
-        levels = self.table4.uncertainty.value
-        return np.concatenate(
-            [
-                _against(table5.mean(axis=3), _table5("smc", list(self._cases))),
-                _against(with_smc.mean(axis=(1, 3)), _averages("4", "smc", levels)),
-                _against(with_lqr.mean(axis=(1, 3)), _averages("4", "lqr", levels)),
-            ],
-            axis=1,
-        )
+        table4 = np.stack([with_smc.mean(axis=(1, 3)), with_lqr.mean(axis=(1, 3))], axis=1)
+        parts = [_against(table5.mean(axis=3), self._cells), _against(table4, self._averages)]
+        return np.concatenate(parts, axis=1)
 
 
 class Tracking:
@@ -239,6 +253,7 @@ class Tracking:
 
     def __init__(self, tracking: Scenario) -> None:
         self.scenario = tracking
+        self._averages = _averages("7", "smc-tracking", tracking.uncertainty.value)
 
     def labels(self) -> list[str]:
         """Arm, state."""
@@ -258,4 +273,4 @@ class Tracking:
             np.tile(x0, (len(k), 1, 1)),
             _plants(self.scenario, 4),
         )
-        return _against(mse.mean(axis=(1, 3)), _averages("7", "smc-tracking", self.scenario.uncertainty.value))
+        return _against(mse.mean(axis=(1, 3)), self._averages)
