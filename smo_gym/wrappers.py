@@ -94,6 +94,8 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
 
     Without a force limit the observer's step is checked for forces up to 30 N, about what the article's runs reach.
 
+    Frames show the estimate as a ghost beside the state.
+
     Args:
         env: an environment of this package.
         observer: "smo" (:class:`~smo_gym.SlidingModeObserver`), "oracle" (the true state) or an

@@ -1,6 +1,7 @@
 """Frames: what is drawn is where the equations put it; windows only where there is a display."""
 
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -209,17 +210,19 @@ def test_rendering_without_a_mode_or_an_episode_is_refused():
         gymnasium.make("SMOPendulum-v0", render_mode="rgb_array").unwrapped.render()
 
 
-@pytest.mark.parametrize("kind", ["gif", "webp"])
-def test_an_animation_is_written(tmp_path, kind):
-    command = [sys.executable, str(ROOT / "agents" / "animate.py"), "--seconds", "0.4", "--out"]
-    out = tmp_path / "new" / f"run.{kind}"
-    subprocess.run([*command, str(out)], check=True, capture_output=True)
-    with Image.open(out) as image:
-        assert (image.n_frames, image.size) == (11, rendering.SIZE)
-        assert image.is_animated
-    bad = subprocess.run([*command, str(tmp_path / "run.gfi")], check=False, capture_output=True, text=True)
-    assert bad.returncode == 2
-    assert "unknown kind of file '.gfi': did you mean '.gif'?" in bad.stderr
+def test_an_animation_is_written(tmp_path, capsys):
+    animate = runpy.run_path(str(ROOT / "agents" / "animate.py"))["main"]
+    for name in ("run.gif", "new/run.webp"):
+        assert animate(["--seconds", "0.4", "--out", str(tmp_path / name)]) == 0
+        with Image.open(tmp_path / name) as image:
+            assert (image.n_frames, image.size) == (11, rendering.SIZE)
+    for bad, message in (
+        (["--out", str(tmp_path / "run.gfi")], "unknown kind of file '.gfi': did you mean '.gif'?"),
+        (["--controller", "lqg"], "unknown controller 'lqg': did you mean 'lqr'?"),
+        (["--seconds", "-1"], "--seconds=-1.0 must be a finite number"),
+    ):
+        assert animate(bad) == 2
+        assert message in capsys.readouterr().err
 
 
 def test_smo_gym_does_not_import_pygame_by_itself():
