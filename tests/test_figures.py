@@ -67,6 +67,15 @@ def test_traces_are_of_the_first_ten_runs_and_change_no_number(study_of_all):
         assert (traced.traces.x_d is None) == (traced.group.scenario.reference is None)
 
 
+def test_traces_of_no_instants_or_none_at_all_are_refused(study_of_all):
+    groups = [outcome.group for outcome in study_of_all[0]]
+    with pytest.raises(ValueError, match="samples=0 must be a positive integer"):
+        study.measure(groups, seed=0, samples=0)
+    nothing = [study.Outcome(o.group, o.metrics, o.failed) for o in study_of_all[0]]
+    with pytest.raises(ValueError, match="lqr has no traces to draw"):
+        figures.draw(figures.PLANS[0], nothing, [])
+
+
 def test_every_figure_of_the_article_is_planned_once():
     assert [plan.number for plan in figures.PLANS] == list(range(3, 18))
     assert len({plan.name for plan in figures.PLANS}) == 15

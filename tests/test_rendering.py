@@ -1,6 +1,8 @@
 """Frames: what is drawn is where the equations put it; windows only where there is a display."""
 
+import copy
 import os
+import pickle
 import runpy
 import subprocess
 import sys
@@ -52,6 +54,17 @@ def test_frames_are_images(env_id):
     assert (env.render() != frame).any()
     env.close()
     env.close()
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_draws_for_itself(copied):
+    env = ObserverWrapper(gymnasium.make("SMOPendulum-v0", render_mode="rgb_array"))
+    env.reset(seed=0)
+    twin, before = copied(env), env.render()
+    twin.step(np.array([20.0]))
+    assert (env.render() == before).all()
+    env.step(np.array([20.0]))
+    assert (env.render() == twin.render()).all()
 
 
 @pytest.mark.parametrize("gravity", [-9.8, 9.8])

@@ -113,6 +113,10 @@ class Renderer:
         if mode == "human":
             self._open()
 
+    def __reduce__(self) -> tuple[type[Renderer], tuple[str, Task]]:
+        """A copy is made anew: pygame's fonts and windows cannot be copied."""
+        return Renderer, (self._mode, self._task)
+
     def _open(self) -> None:
         pg = self._pygame
         try:
