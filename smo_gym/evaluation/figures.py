@@ -163,7 +163,7 @@ def _bars(plan: Plan, results: Iterable[Result]) -> tuple[Figure, str]:
     label = "initial state" if plan.table == "5" else "uncertainty (%)"
     figure = panels.bars({name: cells for name, cells in columns.items() if cells}, label)
     failed = sum(r.failures for r in shown if r.cell.state == "h")
-    text = f"MSE in closed loop: mean of {max(r.runs for r in shown)} runs and its 95 % interval"
+    text = f"MSE without and with compensation: mean of {max(r.runs for r in shown)} runs and its 95 % interval"
     return figure, text + (f"; {failed} runs failed and are left out" if failed else "")
 
 
