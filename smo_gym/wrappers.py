@@ -13,6 +13,7 @@ from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv, VectorWrapper
 from numpy.typing import NDArray
 
+from .envs.pendulum import PendulumEnv
 from .envs.task import Task
 from .observers import OBSERVERS, Observer, Oracle, Period, SlidingModeObserver
 from .validation import choice, unknown
@@ -93,6 +94,8 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
 
     Without a force limit the observer's step is checked for forces up to 30 N, about what the article's runs reach.
 
+    Frames show the estimate as a ghost beside the state.
+
     Args:
         env: an environment of this package.
         observer: "smo" (:class:`~smo_gym.SlidingModeObserver`), "oracle" (the true state) or an
@@ -118,12 +121,15 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
         task = _task(env)
         self.observer = make_observer(observer, compensation, settings)
         self._estimator = self.observer.start(1, task.dt, _force(task), task.params)
+        self._show = cast(PendulumEnv, env.unwrapped).show
+        self._show(self._estimator.xhat[:, 0])
         self.observation_space = _space(env.observation_space)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start the episode and the estimate."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._estimator.reset(np.ones(1, dtype=np.bool_), info["state"][:, None])
+        self._show(self._estimator.xhat[:, 0])
         return self._append(observation, info), info
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
@@ -131,6 +137,7 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
         observation, reward, terminated, truncated, info = self.env.step(action)
         samples, force, state = info["samples"], info["force"], info["state"]
         self._estimator.update(Period(self._y, samples[:, :, None], np.array([force]), state[:, None]))
+        self._show(self._estimator.xhat[:, 0])
         return self._append(observation, info), reward, terminated, truncated, info
 
     def _append(self, observation: Array, info: dict[str, Any]) -> Array:

@@ -24,7 +24,8 @@ EXPLAINED = (
 
 
 @pytest.mark.parametrize("wrapped", [False, True])
-def test_gymnasium_finds_nothing_unexplained(env_id, wrapped):
+def test_gymnasium_finds_nothing_unexplained(env_id, wrapped, monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")  # it opens a window
     env = gymnasium.make(env_id, disable_env_checker=True)
     env = ObserverWrapper(env) if wrapped else env.unwrapped
     with warnings.catch_warnings(record=True) as caught:

@@ -1,7 +1,6 @@
 """The article's figures: what they show is what was measured and published."""
 
-import os
-import subprocess
+import runpy
 import sys
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb, to_rgba
 
-from smo_gym.evaluation import figures, scenario, statistics, study
+from smo_gym.evaluation import figures, panels, scenario, statistics, study
 
 ROOT = Path(__file__).resolve().parent.parent
 NAMES = ("regulation", "initial-conditions", "tracking")
@@ -68,6 +67,15 @@ def test_traces_are_of_the_first_ten_runs_and_change_no_number(study_of_all):
         assert (traced.traces.x_d is None) == (traced.group.scenario.reference is None)
 
 
+def test_traces_of_no_instants_or_none_at_all_are_refused(study_of_all):
+    groups = [outcome.group for outcome in study_of_all[0]]
+    with pytest.raises(ValueError, match="samples=0 must be a positive integer"):
+        study.measure(groups, seed=0, samples=0)
+    nothing = [study.Outcome(o.group, o.metrics, o.failed) for o in study_of_all[0]]
+    with pytest.raises(ValueError, match="lqr has no traces to draw"):
+        figures.draw(figures.PLANS[0], nothing, [])
+
+
 def test_every_figure_of_the_article_is_planned_once():
     assert [plan.number for plan in figures.PLANS] == list(range(3, 18))
     assert len({plan.name for plan in figures.PLANS}) == 15
@@ -78,7 +86,7 @@ def test_states_are_all_ten_runs_of_both_arms(drawn, study_of_all, number, contr
     _, figure = drawn(number)
     assert "20 %" in figure.get_suptitle()
     for j, panel in enumerate(figure.axes):
-        for arm, colour in figures.COLOURS[controller].items():
+        for arm, colour in panels.COLOURS[controller].items():
             traces = shown(study_of_all, controller, "4", arm).traces
             ours = lines(panel, colour)
             assert len(ours) == 10
@@ -92,7 +100,7 @@ def test_cases_have_lqr_on_the_left_and_smc_on_the_right(drawn, study_of_all, nu
     _, figure = drawn(number)
     for i, panel in enumerate(figure.axes):
         controller = ("lqr", "smc")[i % 2]
-        for arm, colour in figures.COLOURS[controller].items():
+        for arm, colour in panels.COLOURS[controller].items():
             traces = shown(study_of_all, controller, "5", arm, 0.05, str(number - 8)).traces
             assert (lines(panel, colour)[3].get_ydata() == traces.x[:, i // 2, 3]).all()
 
@@ -102,7 +110,7 @@ def test_tracking_has_an_arm_a_column_and_the_reference_in_black(drawn, study_of
     for i, panel in enumerate(figure.axes):
         arm = ("without", "with")[i % 2]
         traces = shown(study_of_all, "smc-tracking", "7", arm).traces
-        ours = lines(panel, figures.COLOURS["smc-tracking"][arm])
+        ours = lines(panel, panels.COLOURS["smc-tracking"][arm])
         assert len(ours) == 10
         assert (ours[0].get_ydata() == traces.x[:, i // 2, 0]).all()
         (reference,) = (line for line in panel.lines if line.get_label() == "reference")
@@ -119,7 +127,7 @@ def test_errors_are_true_less_estimated(drawn, study_of_all, number, controller,
     traces = shown(study_of_all, controller, table, "without").traces
     for i, panel in enumerate(figure.axes):
         j, enlarged = i // 2, i % 2
-        line = lines(panel, figures.COLOURS[controller]["without"])[7]
+        line = lines(panel, panels.COLOURS[controller]["without"])[7]
         expected = (traces.x - traces.xhat)[:, j, 7]
         assert (line.get_ydata() == expected[traces.time <= 3.0] if enlarged else expected).all()
         assert line.get_ydata()[0] == traces.x[0, j, 7]  # xhat(0) = 0
@@ -135,7 +143,7 @@ def test_inputs_show_the_range_of_all_runs(drawn, study_of_all, number, controll
         (paths,) = (collection.get_paths() for collection in panel.collections if collection.get_paths())
         band = paths[0].vertices[:, 1]
         assert (band.min(), band.max()) == (traces.u_low.min(), traces.u_high.max())
-        assert len(lines(panel, figures.COLOURS[controller][arm])) == 10
+        assert len(lines(panel, panels.COLOURS[controller][arm])) == 10
         assert arm in panel.get_ylabel() or i % len(controllers)
 
 
@@ -150,7 +158,7 @@ def test_bars_are_the_measured_and_published_numbers(drawn, study_of_all, number
         for bar, label in zip(bars, ("published", "measured") * 2, strict=True):
             arm = bar.get_label().split(",")[0]
             assert bar.get_label() == f"{arm}, {label}"
-            assert to_rgba(figures.COLOURS[controller][arm]) == bar.patches[0].get_edgecolor()
+            assert to_rgba(panels.COLOURS[controller][arm]) == bar.patches[0].get_edgecolor()
             cells = {
                 getattr(r, label)
                 for r in study_of_all[1]
@@ -166,18 +174,32 @@ def test_arms_differ_in_a_grey_print():
     def grey(colour):
         return np.dot(to_rgb(colour), (0.299, 0.587, 0.114))
 
-    for arms in figures.COLOURS.values():
+    for arms in panels.COLOURS.values():
         assert abs(grey(arms["without"]) - grey(arms["with"])) > 0.3
 
 
-def test_files_are_vector_and_raster_and_the_same_again(drawn):
+def test_files_are_vector_and_raster_and_the_same_again(drawn, monkeypatch):
+    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # its global state is not for a library
     _, figure = drawn(3)
     pdf, png = (figures.encode(figure, form) for form in figures.FORMATS)
     assert pdf.startswith(b"%PDF-")
     assert b"/Subtype /Image" not in pdf
     assert png.startswith(b"\x89PNG")
     assert pdf == figures.encode(drawn(3)[1], "pdf")
-    assert "pyplot" not in {name.rpartition(".")[2] for name in sys.modules if name.startswith("matplotlib")}
+
+
+def test_one_arm_of_one_plant_is_drawn_too():
+    one = load("tracking", uncertainty=(0.0,))
+    outcomes = study.measure(study.groups([one], ["smc"], ["with"], 1), seed=0, samples=100)
+    results = statistics.results(outcomes)
+    drawn, left_out = figures.planned([outcome.group for outcome in outcomes])
+    assert [plan.number for plan in drawn] == [14, 15, 16, 17]
+    assert len(drawn) + len(left_out) == 15
+    states, bars, _, inputs = (figures.draw(plan, outcomes, results) for plan in drawn)
+    assert "1 plant at 0 %" in states.get_suptitle()
+    assert [panel.get_legend().get_title().get_text() for panel in states.axes[:1]] == ["with compensation"]
+    assert bars.axes[0].containers[-1].get_label() == "with, measured"
+    assert len(inputs.axes) == 1
 
 
 def test_failed_runs_end_where_they_failed():
@@ -187,33 +209,30 @@ def test_failed_runs_end_where_they_failed():
     figure = figures.draw(plan, outcomes, [])
     failed = [o for o in outcomes if plan.shows(o.group) and o.group.uncertainty and o.failed.any()]
     assert "3 of 6 runs failed and end there" in figure.get_suptitle()
-    line = lines(figure.axes[0], figures.COLOURS["lqr"][failed[0].group.arm])[0]
+    line = lines(figure.axes[0], panels.COLOURS["lqr"][failed[0].group.arm])[0]
     last = line.get_xdata()[np.isfinite(line.get_ydata())][-1]
     assert last == pytest.approx(failed[0].metrics["duration"][0], abs=0.04)
 
 
-def evaluate(*arguments, **environment):
-    command = [sys.executable, str(ROOT / "agents" / "evaluate.py"), "--figures", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=os.environ | environment, check=False)
+evaluate = runpy.run_path(str(ROOT / "agents" / "evaluate.py"))["main"]
 
 
-def test_the_command_draws_what_it_has_runs_for(tmp_path):
+def test_the_command_draws_what_it_has_runs_for(tmp_path, capsys):
     config = tmp_path / "short.yaml"
     config.write_text(f"extends: {ROOT}/configs/regulation.yaml\nhorizon: {{value: 1.0, source: chosen}}\n")
-    done = evaluate("--config", config, "--controller", "lqr", "--runs", "2", "--out", tmp_path / "out")
-    assert done.returncode == 0, done.stderr
-    assert "no runs for Figure 4, 7, 9, 10, 11, 12, 13, 14, 15, 16, 17: not drawn" in done.stdout
+    options = ["--config", str(config), "--controller", "lqr", "--runs", "2", "--out", str(tmp_path / "out")]
+    assert evaluate([*options, "--figures"]) == 0
+    assert "no runs for Figure 4, 7, 9, 10, 11, 12, 13, 14, 15, 16, 17: not drawn" in capsys.readouterr().out
     names = ("03-states-lqr", "05-mse-lqr-smc", "06-errors-lqr", "08-inputs-lqr-smc")
     expected = {f"figure-{name}.{form}" for name in names for form in ("pdf", "png")}
     assert {path.name for path in (tmp_path / "out" / "figures").iterdir()} == expected
 
 
-def test_what_cannot_be_drawn_is_said_before_any_run(tmp_path):
-    done = evaluate("--observer", "oracle", "--out", tmp_path / "out")
-    assert done.returncode == 2
-    assert "no runs to draw" in done.stderr
-    (tmp_path / "matplotlib.py").write_text("raise ImportError\n")
-    done = evaluate("--out", tmp_path / "out", PYTHONPATH=f"{tmp_path}{os.pathsep}{ROOT}")
-    assert done.returncode == 2
-    assert 'pip install "smo_gym[plots]"' in done.stderr
+def test_what_cannot_be_drawn_is_said_before_any_run(tmp_path, capsys, monkeypatch):
+    options = ["--figures", "--out", str(tmp_path / "out")]
+    assert evaluate([*options, "--observer", "oracle"]) == 2
+    assert "no runs to draw" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    assert evaluate(options) == 2
+    assert 'pip install "smo_gym[plots]"' in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

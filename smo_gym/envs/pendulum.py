@@ -6,11 +6,13 @@ from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
+from gymnasium import logger
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from ..validation import unknown
 from .desired import Desired
+from .rendering import MODES, Renderer, Scene
 from .task import HANGING, TRACKING, UPRIGHT, Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
@@ -87,28 +89,42 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
     | `reward` | see above | weights: a mapping with `q`, `r`, `failure` |
     | `reference` | None | a trajectory to follow, :class:`smo_gym.Reference`; None asks for rest at zero |
     | `preview` | 5 | number of future control instants whose x_d a tracking observation tells |
-    | `render_mode` | None | no mode yet |
+    | `render_mode` | None | `"human"`: a window; `"rgb_array"`: frames (400, 800, 3), no display needed |
 
     `reset(options={"state": ..., "params": ...})` replays one exact case; what is not given is drawn.
 
+    ## Rendering
+
+    With the extra `render` (pygame-ce). Cart, rod and bob as they are, of this episode's rod length; the force as an
+    arrow, two rods long at the limit (at 30 N without one); the reference in green; and under
+    :class:`smo_gym.ObserverWrapper` the estimate as a ghost in blue. The frame goes along with a cart that leaves its
+    middle. `metadata["render_fps"]` is that of real time, one frame a control period.
+
     Raises:
         ValueError: an option is unknown or its value is not allowed; an action of another shape or not finite.
-        gymnasium.error.ResetNeeded: `step` before `reset` or after the end of an episode.
+        gymnasium.error.ResetNeeded: `step` before `reset` or after the end of an episode; `render` before `reset`.
+        ImportError: a render mode, but pygame-ce is missing.
+        RuntimeError: `"human"`, but there is no display.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 50}  # type: ignore[misc]
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": MODES, "render_fps": 50}  # type: ignore[misc]
     defaults: ClassVar[Task] = HANGING
 
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
-        if render_mode is not None and render_mode not in self.metadata["render_modes"]:
-            raise ValueError(f"render_mode={render_mode!r} must be None")
+        if render_mode is not None and render_mode not in MODES:
+            raise ValueError(f"render_mode={render_mode!r} must be None or one of {', '.join(map(repr, MODES))}")
         self.render_mode = render_mode
         self.task = Task.of(options, self.defaults)
+        fps = max(round(1.0 / self.task.control_period), 1)
+        self.metadata = {**self.metadata, "render_fps": fps}  # type: ignore[misc]
         self.observation_space = self.task.observation_space
         self.action_space = self.task.action_space
         self._stepper = Stepper(self.task)
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._steps_left = 0
+        self._renderer = None if render_mode is None else Renderer(render_mode, self.task)
+        self._scene: Scene | None = None
+        self._ghost: Array | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Draw a plant and an initial state, or take them from ``options``."""
@@ -121,6 +137,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         self._x, self._params = x[:, None], params[:, None]
         self._steps_left = self._stepper.steps
         samples = np.repeat(x[None, :2], self._stepper.substeps, axis=0)
+        self._see(0, 0.0)
         return self._observation(0), self._info(samples, 0.0, 0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
@@ -139,8 +156,39 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         truncated = self._steps_left == 0 and not terminated
         if terminated:
             self._steps_left = 0
+        self._see(k, float(u[0]))
         info = self._info(samples[:, :, 0], float(u[0]), k)
         return self._observation(k), float(reward[0]), terminated, truncated, info
+
+    def render(self) -> Any:
+        """The frame of the mode: an array (height, width, 3) or, in a window, None."""
+        if self._renderer is None:
+            logger.warn('render() needs a render mode: gymnasium.make(..., render_mode="rgb_array")')
+            return None
+        if self._scene is None:
+            raise ResetNeeded("the episode has not begun: call reset() before render()")
+        return self._renderer.draw(self._scene, self._ghost)
+
+    def show(self, ghost: Array) -> None:
+        """Draw an estimate (4,) beside the state; whoever estimates calls it at once and after each estimate."""
+        if self._renderer is None:
+            return
+        self._ghost = ghost.copy()
+        if self.render_mode == "human" and self._scene is not None:
+            self.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+
+    def _see(self, k: int, force: float) -> None:
+        if self._renderer is None:
+            return
+        x_d = None if self._desired is None else self._desired.states[k]
+        self._scene = Scene(k * self.task.control_period, self._x[:, 0].copy(), self._params[2, 0], force, x_d)
+        if self.render_mode == "human" and self._ghost is None:  # else once the ghost has moved, too
+            self.render()
 
     def _observation(self, k: int) -> Array:
         y = self._x[:2, 0]

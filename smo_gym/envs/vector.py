@@ -58,7 +58,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self.render_mode = render_mode
         self.task = Task.of(options, self.scalar.defaults)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.scalar.metadata, "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**self.scalar.metadata, "render_modes": [], "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = self.task.observation_space
         self.single_action_space = self.task.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)

@@ -35,7 +35,7 @@ class Agent(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Traces:
-    """Every so-manieth control instant of some slots of a rollout, the start included."""
+    """Some slots of a rollout at every so many control instants, the start included."""
 
     time: Array
     """s, (m,)."""

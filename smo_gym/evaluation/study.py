@@ -119,7 +119,12 @@ def measure(
         progress: called with the simulated seconds (over all slots) done since the last call.
         samples: trace the first runs of each group at about so many instants (at least so many, where an episode has
             them, and fewer than twice as many); None traces nothing.
+
+    Raises:
+        ValueError: ``samples`` is no positive integer.
     """
+    if samples is not None and samples < 1:
+        raise ValueError(f"samples={samples!r} must be a positive integer")
     options = {group.scenario.title: group.scenario.options for group in wanted}
     batches: dict[Any, list[int]] = {}
     for index, group in enumerate(wanted):
