@@ -1,0 +1,176 @@
+"""A trained policy frozen to arrays: a small forward pass in NumPy, stored without pickle, run without torch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from safetensors import SafetensorError
+from safetensors.numpy import load as read_tensors
+from safetensors.numpy import save as tensor_bytes
+
+from ..evaluation import files
+from ..validation import choice
+from .observations import KINDS, scaled
+
+Array = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class Card(BaseModel):
+    """What a policy is, beside its weights.
+
+    The first part is what it computes with; the second says where it comes from.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    environment: str
+    observation: str
+    """One of :data:`~smo_gym.learning.observations.KINDS`."""
+    units: tuple[Positive, ...]
+    """Of one frame's entries: what they are divided by."""
+    frames: int = Field(ge=1)
+    layers: tuple[Annotated[int, Field(ge=1)], ...] = Field(min_length=2)
+    """Widths, inputs first; tanh between them."""
+    force_limit: Positive
+    """N; what an action of 1 stands for."""
+
+    command: str = ""
+    seed: int | None = None
+    versions: dict[str, str] = {}
+    configuration: dict[str, Any] = {}
+    """The environment's options and the algorithm's hyperparameters."""
+    curve: list[dict[str, float]] = []
+    """Evaluations during training, on plants that training did not see."""
+    measured: dict[str, float] = {}
+    """The final policy on plants that neither training nor those evaluations saw."""
+
+
+@dataclass(frozen=True)
+class MlpPolicy:
+    """u = force_limit clip(W_n tanh(... tanh(W_1 o + b_1) ...) + b_n, -1, 1), o the scaled observation.
+
+    Weights are (out, in), biases (out,). A policy of positions alone also takes observations that an estimate follows,
+    and does not look at it.
+
+    Raises:
+        ValueError: an unknown kind of observation, or weights that do not fit the card.
+    """
+
+    card: Card
+    layers: Sequence[tuple[Array, Array]]
+    _units: Array = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        card = self.card
+        choice("observation", card.observation, KINDS)
+        wanted = list(zip(card.layers[1:], card.layers[:-1], strict=True))
+        shapes = [(W.shape, b.shape) for W, b in self.layers]
+        if shapes != [(shape, shape[:1]) for shape in wanted]:
+            raise ValueError(
+                f"weights have shapes {[W for W, _ in shapes]}, the card's layers={card.layers} ask {wanted}"
+            )
+        if card.layers[0] != card.frames * len(card.units) or card.layers[-1] != 1:
+            raise ValueError(
+                f"layers={card.layers} must lead from {card.frames} frames of {len(card.units)} entries to one force"
+            )
+        if not all(np.isfinite(W).all() and np.isfinite(b).all() for W, b in self.layers):
+            raise ValueError("weights must be finite")
+        object.__setattr__(self, "_units", np.array(card.units))
+
+    def predict(
+        self,
+        observation: Array,
+        state: tuple[Array, ...] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        """The force in N, shape (n, 1) for observations (n, observation) and (1,) for one.
+
+        Where the policy sees several frames, ``state`` carries them, (n, frames, entries); they begin anew where
+        ``episode_start`` is true, and everywhere without a state. The policy is always deterministic.
+
+        Raises:
+            ValueError: the observation is of another environment or lacks its observer.
+        """
+        frame = scaled(self._seen(np.asarray(observation)), self._units)
+        inputs = np.atleast_2d(frame)
+        if self.card.frames > 1:
+            repeated = np.repeat(inputs[:, None], self.card.frames, axis=1)
+            if state is None:
+                frames = repeated
+            else:
+                frames = np.concatenate([state[0][:, 1:], inputs[:, None]], axis=1)
+                if episode_start is not None:
+                    frames = np.where(np.reshape(episode_start, (-1, 1, 1)), repeated, frames)
+            inputs, state = frames.reshape(len(inputs), -1), (frames,)
+        for W, b in self.layers[:-1]:
+            inputs = np.tanh(inputs @ W.T + b)
+        W, b = self.layers[-1]
+        u = self.card.force_limit * np.clip(inputs @ W.T + b, -1.0, 1.0)
+        return (u if frame.ndim == 2 else u[0]), state
+
+    def _seen(self, observation: Array) -> Array:
+        size, given = len(self._units), observation.shape[-1]
+        allowed = (size,) if KINDS[self.card.observation].observer else (size, size + 4)
+        if given not in allowed:
+            raise ValueError(
+                f"observation has shape {observation.shape}: this policy of {self.card.environment} sees "
+                f"{self.card.observation!r}, {' or '.join(map(str, allowed))} entries"
+            )
+        return observation[..., :size]
+
+    def save(self, path: Path) -> None:
+        """Write ``path`` (.safetensors) and the card beside it (.json), each as a whole, the weights last."""
+        tensors: dict[str, Array] = {}
+        for k, (W, b) in enumerate(self.layers):
+            tensors |= {f"{k}.weight": np.ascontiguousarray(W), f"{k}.bias": np.ascontiguousarray(b)}
+        files.write(path.with_suffix(".json"), json.dumps(self.card.model_dump(mode="json"), indent=1) + "\n")
+        files.write_bytes(path, tensor_bytes(tensors))
+
+    @classmethod
+    def load(cls, path: Path | str) -> MlpPolicy:
+        """A policy from its weights (.safetensors) and the card of the same name (.json) beside them.
+
+        Raises:
+            ValueError: a file is missing, corrupt, or does not fit the other; it is named.
+        """
+        path = Path(path)
+        beside = path.with_suffix(".json")
+        try:
+            card = Card.model_validate_json(_read(beside))
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            raise ValueError(
+                f"{beside}: is no card of a policy ({place + ': ' if place else ''}{first['msg']})"
+            ) from None
+        try:
+            tensors = read_tensors(_read(path))
+        except SafetensorError as error:
+            raise ValueError(f"{path}: is corrupt or no safetensors file ({error})") from None
+        count = len(card.layers) - 1
+        names = {f"{k}.{part}" for k in range(count) for part in ("weight", "bias")}
+        if tensors.keys() != names:
+            raise ValueError(f"{path}: holds {sorted(tensors)}, the card asks for {sorted(names)}")
+        layers = [
+            (tensors[f"{k}.weight"].astype(np.float64), tensors[f"{k}.bias"].astype(np.float64)) for k in range(count)
+        ]
+        try:
+            return cls(card, layers)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
