@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from safetensors import SafetensorError
 from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
+from scipy.special import expit
 
 from ..evaluation import files
 from ..validation import choice
@@ -39,6 +40,8 @@ class Card(BaseModel):
     frames: int = Field(ge=1)
     layers: tuple[Annotated[int, Field(ge=1)], ...] = Field(min_length=2)
     """Widths, inputs first; tanh between them."""
+    lstm: Annotated[int, Field(ge=1)] | None = None
+    """Width of an LSTM in front of the layers."""
     force_limit: Positive
     """N; what an action of 1 stands for."""
 
@@ -66,7 +69,6 @@ class MlpPolicy:
 
     card: Card
     layers: Sequence[tuple[Array, Array]]
-    _units: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         card = self.card
@@ -77,13 +79,11 @@ class MlpPolicy:
             raise ValueError(
                 f"weights have shapes {[W for W, _ in shapes]}, the card's layers={card.layers} ask {wanted}"
             )
-        if card.layers[0] != card.frames * len(card.units) or card.layers[-1] != 1:
-            raise ValueError(
-                f"layers={card.layers} must lead from {card.frames} frames of {len(card.units)} entries to one force"
-            )
+        told = card.lstm or card.frames * len(card.units)
+        if card.layers[0] != told or card.layers[-1] != 1:
+            raise ValueError(f"layers={card.layers} must lead from {told} inputs to one force")
         if not all(np.isfinite(W).all() and np.isfinite(b).all() for W, b in self.layers):
             raise ValueError("weights must be finite")
-        object.__setattr__(self, "_units", np.array(card.units))
 
     def predict(
         self,
@@ -100,25 +100,29 @@ class MlpPolicy:
         Raises:
             ValueError: the observation is of another environment or lacks its observer.
         """
-        frame = scaled(self._seen(np.asarray(observation)), self._units)
-        inputs = np.atleast_2d(frame)
-        if self.card.frames > 1:
-            repeated = np.repeat(inputs[:, None], self.card.frames, axis=1)
-            if state is None:
-                frames = repeated
-            else:
-                frames = np.concatenate([state[0][:, 1:], inputs[:, None]], axis=1)
-                if episode_start is not None:
-                    frames = np.where(np.reshape(episode_start, (-1, 1, 1)), repeated, frames)
-            inputs, state = frames.reshape(len(inputs), -1), (frames,)
+        frame = scaled(self._seen(np.asarray(observation)), np.array(self.card.units))
+        inputs, state = self._remember(np.atleast_2d(frame), state, episode_start)
         for W, b in self.layers[:-1]:
             inputs = np.tanh(inputs @ W.T + b)
         W, b = self.layers[-1]
         u = self.card.force_limit * np.clip(inputs @ W.T + b, -1.0, 1.0)
         return (u if frame.ndim == 2 else u[0]), state
 
+    def _remember(
+        self, frame: Array, state: tuple[Array, ...] | None, episode_start: NDArray[np.bool_] | None
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        """Inputs of the first layer from the newest frame (n, entries) and what came before."""
+        if self.card.frames == 1:
+            return frame, state
+        repeated = np.repeat(frame[:, None], self.card.frames, axis=1)
+        frames = repeated
+        if state is not None:
+            frames = np.concatenate([state[0][:, 1:], frame[:, None]], axis=1)
+            frames = np.where(_starts(episode_start)[:, None, None], repeated, frames)
+        return frames.reshape(len(frame), -1), (frames,)
+
     def _seen(self, observation: Array) -> Array:
-        size, given = len(self._units), observation.shape[-1]
+        size, given = len(self.card.units), observation.shape[-1]
         allowed = (size,) if KINDS[self.card.observation].observer else (size, size + 4)
         if given not in allowed:
             raise ValueError(
@@ -132,11 +136,15 @@ class MlpPolicy:
         tensors: dict[str, Array] = {}
         for k, (W, b) in enumerate(self.layers):
             tensors |= {f"{k}.weight": np.ascontiguousarray(W), f"{k}.bias": np.ascontiguousarray(b)}
+        tensors |= self._memory()
         files.write(path.with_suffix(".json"), json.dumps(self.card.model_dump(mode="json"), indent=1) + "\n")
         files.write_bytes(path, tensor_bytes(tensors))
 
-    @classmethod
-    def load(cls, path: Path | str) -> MlpPolicy:
+    def _memory(self) -> dict[str, Array]:
+        return {}
+
+    @staticmethod
+    def load(path: Path | str) -> MlpPolicy:
         """A policy from its weights (.safetensors) and the card of the same name (.json) beside them.
 
         Raises:
@@ -158,15 +166,60 @@ class MlpPolicy:
             raise ValueError(f"{path}: is corrupt or no safetensors file ({error})") from None
         count = len(card.layers) - 1
         names = {f"{k}.{part}" for k in range(count) for part in ("weight", "bias")}
+        names |= set(LSTM) if card.lstm else set()
         if tensors.keys() != names:
             raise ValueError(f"{path}: holds {sorted(tensors)}, the card asks for {sorted(names)}")
-        layers = [
-            (tensors[f"{k}.weight"].astype(np.float64), tensors[f"{k}.bias"].astype(np.float64)) for k in range(count)
-        ]
+        tensors = {name: tensor.astype(np.float64) for name, tensor in tensors.items()}
+        layers = [(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(count)]
         try:
-            return cls(card, layers)
+            return LstmPolicy(card, layers, tuple(tensors[k] for k in LSTM)) if card.lstm else MlpPolicy(card, layers)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
+
+
+LSTM = ("lstm.weight_ih", "lstm.weight_hh", "lstm.bias_ih", "lstm.bias_hh")
+
+
+@dataclass(frozen=True)
+class LstmPolicy(MlpPolicy):
+    """The same behind an LSTM of width m, whose gates i, f, g, o stand below each other as torch has them.
+
+    ::
+
+        c <- sigma(f) c + sigma(i) tanh(g),   h <- sigma(o) tanh(c)
+
+    ``state`` is (h, c), each (n, m).
+
+    Args:
+        lstm: weights of the inputs (4 m, inputs) and of h (4 m, m), and the bias of each (4 m,).
+    """
+
+    lstm: tuple[Array, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        m, inputs = self.card.lstm or 0, self.card.frames * len(self.card.units)
+        wanted = [(4 * m, inputs), (4 * m, m), (4 * m,), (4 * m,)]
+        if [part.shape for part in self.lstm] != wanted:
+            raise ValueError(f"lstm has shapes {[part.shape for part in self.lstm]}, the card asks for {wanted}")
+
+    def _remember(
+        self, frame: Array, state: tuple[Array, ...] | None, episode_start: NDArray[np.bool_] | None
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        W, U, b, d = self.lstm
+        h, c = state or (np.zeros((len(frame), U.shape[1])),) * 2
+        keep = ~_starts(episode_start)[..., None]
+        i, f, g, o = np.split(frame @ W.T + b + (h * keep) @ U.T + d, 4, axis=1)
+        c = expit(f) * c * keep + expit(i) * np.tanh(g)
+        h = expit(o) * np.tanh(c)
+        return h, (h, c)
+
+    def _memory(self) -> dict[str, Array]:
+        return dict(zip(LSTM, self.lstm, strict=True))
+
+
+def _starts(episode_start: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    return np.atleast_1d(np.asarray(False if episode_start is None else episode_start, dtype=np.bool_))
 
 
 def _read(path: Path) -> bytes:

@@ -113,3 +113,28 @@ def _together(each: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
     if any(options.keys() != each[0].keys() for options in each):
         raise ValueError("reset options must name the same things for every slot")
     return {name: np.stack([np.asarray(options[name]) for options in each]) for name in each[0]}
+
+
+def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Weights and biases, inputs first, of an actor whose hidden layers are dense with tanh.
+
+    Raises:
+        ValueError: the actor has layers of another kind.
+    """
+    hidden = list(policy.mlp_extractor.policy_net)
+    dense, between = [*hidden[::2], policy.action_net], hidden[1::2]
+    if any(type(layer).__name__ != "Linear" for layer in dense) or any(type(f).__name__ != "Tanh" for f in between):
+        raise ValueError(f"policy has the layers {hidden}, they must be dense with tanh between them")
+    return [tuple(np.array(part.detach(), np.float64) for part in (d.weight, d.bias)) for d in dense]  # type: ignore[misc]
+
+
+def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
+    """Weights and biases of a single LSTM layer: of its inputs, of its own output.
+
+    Raises:
+        ValueError: there are several layers.
+    """
+    if lstm.num_layers != 1:
+        raise ValueError(f"lstm has {lstm.num_layers} layers, it must have 1")
+    parts = (lstm.weight_ih_l0, lstm.weight_hh_l0, lstm.bias_ih_l0, lstm.bias_hh_l0)
+    return tuple(np.array(part.detach(), np.float64) for part in parts)
