@@ -2,8 +2,8 @@
 
     python agents/train.py --env SMOPendulum-v0 --observation smo
 
-Writes to --out, every twentieth of the way, a checkpoint, from which the same command resumes; at the end the policy, as
-policy.safetensors and a card policy.json of what it is, where it comes from and what it was measured to do.
+Writes a checkpoint to --out every twentieth of the way, from which the same command resumes; at the end the policy,
+policy.safetensors, and a card of what it is, where it comes from and what it was measured to do, policy.json.
 """
 
 from __future__ import annotations

@@ -76,9 +76,7 @@ class MlpPolicy:
         wanted = list(zip(card.layers[1:], card.layers[:-1], strict=True))
         shapes = [(W.shape, b.shape) for W, b in self.layers]
         if shapes != [(shape, shape[:1]) for shape in wanted]:
-            raise ValueError(
-                f"weights have shapes {[W for W, _ in shapes]}, the card's layers={card.layers} ask {wanted}"
-            )
+            raise ValueError(f"weights have shapes {[W for W, _ in shapes]}, the card asks for {wanted}")
         told = card.lstm or card.frames * len(card.units)
         if card.layers[0] != told or card.layers[-1] != 1:
             raise ValueError(f"layers={card.layers} must lead from {told} inputs to one force")

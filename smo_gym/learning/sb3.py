@@ -67,7 +67,7 @@ class SB3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: int | Iterable[int] | None = None) -> list[Any]:
         """The attribute of the nearest wrapper that has it, for each slot asked for."""
-        value = self._find(attr_name)
+        value = getattr(self._owner(attr_name), attr_name)
         return [value[i] if attr_name in PER_SLOT else value for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: int | Iterable[int] | None = None) -> None:
@@ -78,16 +78,13 @@ class SB3VecEnv(VecEnv):
         """
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
             raise ValueError(f"set_attr({attr_name!r}, indices={indices}): one batch shares its attributes, set all")
-        owner = self.env
-        while attr_name not in vars(owner) and isinstance(owner, VectorWrapper):
-            owner = owner.env
-        setattr(owner, attr_name, value)
+        setattr(self._owner(attr_name), attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: int | Iterable[int] | None = None, **method_kwargs: Any
     ) -> list[Any]:
         """Call a method once, on the batch; what it returns stands for each slot asked for."""
-        result = self._find(method_name)(*method_args, **method_kwargs)
+        result = getattr(self._owner(method_name), method_name)(*method_args, **method_kwargs)
         return [result for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
@@ -102,8 +99,12 @@ class SB3VecEnv(VecEnv):
             layers.append(layers[-1].env)
         return layers
 
-    def _find(self, name: str) -> Any:
-        return getattr(self.env, name)
+    def _owner(self, name: str) -> Any:
+        """The outermost layer that has the attribute."""
+        for layer in self._layers():
+            if hasattr(layer, name):
+                return layer
+        raise AttributeError(f"{self.env} has no attribute {name!r}")
 
 
 def _together(each: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
@@ -125,7 +126,7 @@ def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]
     dense, between = [*hidden[::2], policy.action_net], hidden[1::2]
     if any(type(layer).__name__ != "Linear" for layer in dense) or any(type(f).__name__ != "Tanh" for f in between):
         raise ValueError(f"policy has the layers {hidden}, they must be dense with tanh between them")
-    return [tuple(np.array(part.detach(), np.float64) for part in (d.weight, d.bias)) for d in dense]  # type: ignore[misc]
+    return [tuple(part.detach().numpy().astype(np.float64) for part in (d.weight, d.bias)) for d in dense]
 
 
 def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
@@ -137,4 +138,4 @@ def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
     if lstm.num_layers != 1:
         raise ValueError(f"lstm has {lstm.num_layers} layers, it must have 1")
     parts = (lstm.weight_ih_l0, lstm.weight_hh_l0, lstm.bias_ih_l0, lstm.bias_hh_l0)
-    return tuple(np.array(part.detach(), np.float64) for part in parts)
+    return tuple(part.detach().numpy().astype(np.float64) for part in parts)

@@ -68,6 +68,11 @@ class Run:
             raise ValueError(f"observation={self.observation!r}: the recurrent algorithm is for 'positions' alone")
         known = set(inspect.signature(ALGORITHMS[self.algorithm].__init__).parameters) - {"self", "env", "seed"}
         mapping("hyperparameter", self.hyperparameters, known)
+        counts = {"n_envs": self.n_envs, "n_timesteps": self.steps, "n_steps": self.hyperparameters.get("n_steps")}
+        for name, value in counts.items():
+            if not isinstance(value, int) or value < 1:
+                raise ValueError(f"{name}={value!r} must be a whole number of at least 1")
+        _built(self)
         make(self, 1, AutoresetMode.SAME_STEP).close()
         return self
 
@@ -123,14 +128,15 @@ def seeds(stream: int, n: int, *key: int) -> list[int]:
     return [int(seed) for seed in np.random.SeedSequence(key, spawn_key=(stream,)).generate_state(n)]
 
 
-def measure(policy: MlpPolicy, stream: int = TEST, runs: int = 100) -> dict[str, float]:
-    """A policy on random plants and starts of its own environment, over the environment's whole horizon.
+def measure(policy: MlpPolicy, stream: int = TEST, runs: int = 100, horizon: float | None = None) -> dict[str, float]:
+    """A policy on random plants and starts of its training, over the environment's own horizon or another.
 
     Returns:
         Runs, how many failed, and the means of the others' MSE of h in m^2 and of theta in rad^2.
     """
     card = policy.card
     options = {name: value for name, value in card.configuration["options"].items() if name != "horizon"}
+    options |= {} if horizon is None else {"horizon": horizon}
     env = gymnasium.make_vec(card.environment, runs, autoreset_mode=AutoresetMode.DISABLED, **options)
     observer = KINDS[card.observation].observer
     outcome = rollout(VectorObserverWrapper(env, **observer) if observer else env, policy, seed=seeds(stream, 1)[0])
@@ -164,8 +170,8 @@ def frozen(model: Any, run: Run) -> MlpPolicy:
 class Watch(BaseCallback):
     """Every twentieth of a run: evaluate, keep a checkpoint, and begin afresh with seeds of that place.
 
-    So what follows a checkpoint depends on the checkpoint alone: on the same machine and number of threads a run that was
-    interrupted ends where an uninterrupted one does.
+    So what follows a checkpoint depends on the checkpoint alone: an interrupted run ends where an uninterrupted one
+    does, on the same machine and number of threads.
     """
 
     def __init__(self, run: Run, checkpoint: Path, progress: Callable[[int, dict[str, float]], object]) -> None:
@@ -277,7 +283,11 @@ def agree(path: Path, settings: dict[str, Any]) -> None:
 
 def _built(run: Run) -> dict[str, Any]:
     """Hyperparameters with the zoo's schedules: lin_1e-3 falls from 1e-3 to 0."""
-    return {
-        name: LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0) if str(value).startswith("lin_") else value
-        for name, value in run.hyperparameters.items()
-    }
+    built = dict(run.hyperparameters)
+    for name, value in built.items():
+        if isinstance(value, str) and value.startswith("lin_"):
+            try:
+                built[name] = LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
+            except ValueError:
+                raise ValueError(f"{name}={value!r} must be a number, or lin_ and a number") from None
+    return built
