@@ -64,6 +64,15 @@ def test_an_interrupted_run_ends_where_an_uninterrupted_one_does(command, tmp_pa
     assert (tmp_path / "run/policy.safetensors").read_bytes() == before
 
 
+def test_the_default_actor_is_odd_on_its_way_too(command, tmp_path):
+    assert command() == 0
+    policy = MlpPolicy.load(tmp_path / "run/policy.safetensors")
+    observation = np.random.default_rng(0).normal(size=(20, 6))
+    forces, _ = policy.predict(observation)
+    assert np.abs(forces).max() > 0.0
+    assert np.array_equal(policy.predict(-observation)[0], -forces)
+
+
 def test_seeds_lead_to_other_policies(command, tmp_path):
     policies = []
     for seed in ("0", "1"):
@@ -131,7 +140,11 @@ def test_bad_arguments(arguments, message, tmp_path, capsys):
         ({"env_wrapper": ["a.b"]}, "env_wrapper="),
         ({"env_kwargs": {"horizn": 1.0}}, "did you mean 'horizon'"),
         ({"n_steps": "many"}, "n_steps='many' must be"),
-        ({"learning_rate": "lin_fast"}, "learning_rate"),
+        ({"learning_rate": "lin_fast"}, "learning_rate='lin_fast' must be"),
+        (
+            {"policy": "smo_gym.learning.actor.EvenPolicy"},
+            "policy='smo_gym.learning.actor.EvenPolicy' cannot be imported",
+        ),
     ],
 )
 def test_bad_settings(change, message, tmp_path, capsys):

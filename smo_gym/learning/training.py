@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import pkgutil
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -257,8 +258,13 @@ def agree(path: Path, settings: dict[str, Any]) -> None:
 
 
 def _built(run: Run) -> dict[str, Any]:
-    """Hyperparameters with the zoo's schedules: lin_1e-3 falls from 1e-3 to 0."""
+    """Hyperparameters, the zoo's names replaced: a class for its path, a fall from 1e-3 to 0 for lin_1e-3."""
     built = dict(run.hyperparameters)
+    if "." in str(built["policy"]):
+        try:
+            built["policy"] = pkgutil.resolve_name(built["policy"])
+        except (ImportError, AttributeError, ValueError) as error:
+            raise ValueError(f"policy={built['policy']!r} cannot be imported ({error})") from None
     for name, value in built.items():
         if isinstance(value, str) and value.startswith("lin_"):
             try:
