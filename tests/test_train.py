@@ -64,13 +64,14 @@ def test_an_interrupted_run_ends_where_an_uninterrupted_one_does(command, tmp_pa
     assert (tmp_path / "run/policy.safetensors").read_bytes() == before
 
 
-def test_the_default_actor_is_odd_on_its_way_too(command, tmp_path):
+def test_the_default_actor_is_at_rest_at_the_origin(command, tmp_path):
     assert command() == 0
     policy = MlpPolicy.load(tmp_path / "run/policy.safetensors")
-    observation = np.random.default_rng(0).normal(size=(20, 6))
-    forces, _ = policy.predict(observation)
-    assert np.abs(forces).max() > 0.0
-    assert np.array_equal(policy.predict(-observation)[0], -forces)
+    force, _ = policy.predict(np.zeros(6))
+    assert abs(force[0]) < 1e-12
+    assert np.abs(policy.layers[0][1]).max() > 0.0
+    force, _ = policy.predict(np.ones(6))
+    assert abs(force[0]) > 1e-3
 
 
 def test_seeds_lead_to_other_policies(command, tmp_path):
@@ -142,8 +143,8 @@ def test_bad_arguments(arguments, message, tmp_path, capsys):
         ({"n_steps": "many"}, "n_steps='many' must be"),
         ({"learning_rate": "lin_fast"}, "learning_rate='lin_fast' must be"),
         (
-            {"policy": "smo_gym.learning.actor.EvenPolicy"},
-            "policy='smo_gym.learning.actor.EvenPolicy' cannot be imported",
+            {"policy": "smo_gym.learning.actor.NonePolicy"},
+            "policy='smo_gym.learning.actor.NonePolicy' cannot be imported",
         ),
     ],
 )

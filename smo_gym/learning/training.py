@@ -70,7 +70,7 @@ class Run:
         for name, value in counts.items():
             if not isinstance(value, int) or value < 1:
                 raise ValueError(f"{name}={value!r} must be a whole number of at least 1")
-        _built(self)
+        built(self)
         make(self, 1, AutoresetMode.SAME_STEP).close()
         return self
 
@@ -222,7 +222,7 @@ def train(
             raise ValueError(f"{checkpoint}: cannot be read ({error}): remove it to begin anew") from None
     else:
         model = algorithm(
-            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **_built(run)
+            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **built(run)
         )
     watch = Watch(run, checkpoint, progress)
     progress(model.num_timesteps, {})
@@ -257,7 +257,7 @@ def agree(path: Path, settings: dict[str, Any]) -> None:
         raise ValueError(f"{path.parent} holds a run with another configuration: {'; '.join(differences)}")
 
 
-def _built(run: Run) -> dict[str, Any]:
+def built(run: Run) -> dict[str, Any]:
     """Hyperparameters, the zoo's names replaced: a class for its path, a fall from 1e-3 to 0 for lin_1e-3."""
     built = dict(run.hyperparameters)
     if "." in str(built["policy"]):
