@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 import json
 import os
-import pkgutil
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -258,17 +257,12 @@ def agree(path: Path, settings: dict[str, Any]) -> None:
 
 
 def built(run: Run) -> dict[str, Any]:
-    """Hyperparameters, the zoo's names replaced: a class for its path, a fall from 1e-3 to 0 for lin_1e-3."""
-    built = dict(run.hyperparameters)
-    if "." in str(built["policy"]):
-        try:
-            built["policy"] = pkgutil.resolve_name(built["policy"])
-        except (ImportError, AttributeError, ValueError) as error:
-            raise ValueError(f"policy={built['policy']!r} cannot be imported ({error})") from None
-    for name, value in built.items():
+    """Hyperparameters with the zoo's schedules: lin_1e-3 falls from 1e-3 to 0."""
+    found = dict(run.hyperparameters)
+    for name, value in found.items():
         if isinstance(value, str) and value.startswith("lin_"):
             try:
-                built[name] = LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
+                found[name] = LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
             except ValueError:
                 raise ValueError(f"{name}={value!r} must be a number, or lin_ and a number") from None
-    return built
+    return found
