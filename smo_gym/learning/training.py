@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -37,6 +38,7 @@ Array = NDArray[np.float64]
 ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "recurrent": RecurrentPPO}
 VIEW = "smo_gym.learning.observations.agent_view"
 CHECKPOINTS = 20
+BEST = "best.safetensors"
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ def frozen(model: Any, run: Run) -> MlpPolicy:
 
 
 class Watch(BaseCallback):
-    """Every twentieth of a run: evaluate, keep a checkpoint, and begin afresh with seeds of that place.
+    """Every twentieth of a run: evaluate, keep the best policy and a checkpoint, begin afresh with seeds of that place.
 
     So what follows a checkpoint depends on the checkpoint alone: an interrupted run ends where an uninterrupted one
     does, on the same machine and number of threads.
@@ -164,9 +166,13 @@ class Watch(BaseCallback):
         self._fresh = False
 
     def keep(self) -> None:
-        """Evaluate and write a checkpoint."""
-        found = measure(frozen(self.model, self._run), VALIDATION)
-        self.model.curve = [*curve(self.model), {"steps": self.num_timesteps, **found}]  # type: ignore[attr-defined]
+        """Evaluate, write the policy if none was better before, and a checkpoint."""
+        policy = frozen(self.model, self._run)
+        found = measure(policy, VALIDATION)
+        before = curve(self.model)
+        if not before or cost(found) < min(cost(point) for point in before):
+            policy.save(self._checkpoint.with_name(BEST))
+        self.model.curve = [*before, {"steps": self.num_timesteps, **found}]  # type: ignore[attr-defined]
         for name, value in found.items():
             self.logger.record(f"validation/{name}", value)
         half = self._checkpoint.with_suffix(".half.zip")
@@ -189,6 +195,11 @@ def curve(model: Any) -> list[dict[str, float]]:
     return list(getattr(model, "curve", []))
 
 
+def cost(found: dict[str, float]) -> tuple[float, float]:
+    """What a policy is chosen by: failures first, then MSE of h + MSE of theta."""
+    return found["failed"], found.get("mse_h", math.inf) + found.get("mse_theta", math.inf)
+
+
 def train(
     run: Run,
     folder: Path,
@@ -204,7 +215,8 @@ def train(
         tensorboard: write what TensorBoard shows, too.
 
     Returns:
-        The final policy with its curve and measured result on its card.
+        Of the policies at the checkpoints the one that did best on validation plants, with the curve and its result on
+        test plants on its card.
 
     Raises:
         ValueError: the folder holds a run of other settings, or a checkpoint that cannot be read.
@@ -228,7 +240,7 @@ def train(
     if model.num_timesteps < run.steps:
         model.learn(run.steps - model.num_timesteps, callback=watch, reset_num_timesteps=False, tb_log_name="run")
         watch.keep()
-    policy = frozen(model, run)
+    policy = MlpPolicy.load(folder / BEST)
     card = policy.card.model_copy(update={"curve": curve(model), "measured": measure(policy)})
     return replace(policy, card=card)
 
