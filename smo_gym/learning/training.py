@@ -184,6 +184,10 @@ class Watch(BaseCallback):
         seed = seeds(TRAINING, 1, self._run.seed, self.num_timesteps)[0]
         self.model.set_random_seed(seed)
         self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
+        # the first episodes end at random times: else all slots would go through their episodes in step, and every
+        # update would see one phase of them alone
+        left, task = (self.training_env.get_attr(name, 0)[0] for name in ("_steps_left", "task"))
+        left[:] = np.random.default_rng(seed).integers(1, task.steps, len(left), endpoint=True)
         self.model._last_episode_starts = np.ones(self._run.n_envs, dtype=np.bool_)
 
     def _on_step(self) -> bool:
