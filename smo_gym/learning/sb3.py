@@ -9,6 +9,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from numpy.typing import NDArray
 
+from .actor import Anchored
+
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
@@ -122,11 +124,19 @@ def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]
     Raises:
         ValueError: the actor has layers of another kind.
     """
-    hidden = list(policy.mlp_extractor.policy_net)
+    net = policy.mlp_extractor.policy_net
+    hidden = list(net.net if isinstance(net, Anchored) else net)
     dense, between = [*hidden[::2], policy.action_net], hidden[1::2]
     if any(type(layer).__name__ != "Linear" for layer in dense) or any(type(f).__name__ != "Tanh" for f in between):
         raise ValueError(f"policy has the layers {hidden}, they must be dense with tanh between them")
-    return [tuple(part.detach().numpy().astype(np.float64) for part in (d.weight, d.bias)) for d in dense]
+    found = [(_array(layer.weight), _array(layer.bias)) for layer in dense]
+    if isinstance(net, Anchored):  # the last bias takes f(0) away
+        features = np.zeros(found[0][0].shape[1])
+        for W, b in found[:-1]:
+            features = np.tanh(W @ features + b)
+        W, b = found[-1]
+        found[-1] = W, b - W @ features
+    return found
 
 
 def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
@@ -138,4 +148,8 @@ def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
     if lstm.num_layers != 1:
         raise ValueError(f"lstm has {lstm.num_layers} layers, it must have 1")
     parts = (lstm.weight_ih_l0, lstm.weight_hh_l0, lstm.bias_ih_l0, lstm.bias_hh_l0)
-    return tuple(part.detach().numpy().astype(np.float64) for part in parts)
+    return tuple(_array(part) for part in parts)
+
+
+def _array(parameter: Any) -> NDArray[np.float64]:
+    return parameter.detach().numpy().astype(np.float64)  # type: ignore[no-any-return]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import pkgutil
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -69,7 +70,7 @@ class Run:
         for name, value in counts.items():
             if not isinstance(value, int) or value < 1:
                 raise ValueError(f"{name}={value!r} must be a whole number of at least 1")
-        _built(self)
+        built(self)
         make(self, 1, AutoresetMode.SAME_STEP).close()
         return self
 
@@ -221,7 +222,7 @@ def train(
             raise ValueError(f"{checkpoint}: cannot be read ({error}): remove it to begin anew") from None
     else:
         model = algorithm(
-            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **_built(run)
+            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **built(run)
         )
     watch = Watch(run, checkpoint, progress)
     progress(model.num_timesteps, {})
@@ -256,9 +257,14 @@ def agree(path: Path, settings: dict[str, Any]) -> None:
         raise ValueError(f"{path.parent} holds a run with another configuration: {'; '.join(differences)}")
 
 
-def _built(run: Run) -> dict[str, Any]:
-    """Hyperparameters with the zoo's schedules: lin_1e-3 falls from 1e-3 to 0."""
+def built(run: Run) -> dict[str, Any]:
+    """Hyperparameters, the zoo's names replaced: a class for its path, a fall from 1e-3 to 0 for lin_1e-3."""
     built = dict(run.hyperparameters)
+    if "." in str(built["policy"]):
+        try:
+            built["policy"] = pkgutil.resolve_name(built["policy"])
+        except (ImportError, AttributeError, ValueError) as error:
+            raise ValueError(f"policy={built['policy']!r} cannot be imported ({error})") from None
     for name, value in built.items():
         if isinstance(value, str) and value.startswith("lin_"):
             try:
