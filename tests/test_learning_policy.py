@@ -17,7 +17,7 @@ from smo_gym.learning.policy import Card
 from smo_gym.learning.training import Run, built, frozen
 
 SMALL = {
-    "policy": "smo_gym.learning.actor.AnchoredPolicy",
+    "policy": "MlpPolicy",
     "n_steps": 8,
     "batch_size": 8,
     "policy_kwargs": {"net_arch": [16, 8]},

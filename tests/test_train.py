@@ -64,16 +64,6 @@ def test_an_interrupted_run_ends_where_an_uninterrupted_one_does(command, tmp_pa
     assert (tmp_path / "run/policy.safetensors").read_bytes() == before
 
 
-def test_the_default_actor_is_at_rest_at_the_origin(command, tmp_path):
-    assert command() == 0
-    policy = MlpPolicy.load(tmp_path / "run/policy.safetensors")
-    force, _ = policy.predict(np.zeros(6))
-    assert abs(force[0]) < 1e-12
-    assert np.abs(policy.layers[0][1]).max() > 0.0
-    force, _ = policy.predict(np.ones(6))
-    assert abs(force[0]) > 1e-3
-
-
 def test_seeds_lead_to_other_policies(command, tmp_path):
     policies = []
     for seed in ("0", "1"):

@@ -9,8 +9,6 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from numpy.typing import NDArray
 
-from .actor import Anchored
-
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
@@ -124,19 +122,11 @@ def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]
     Raises:
         ValueError: the actor has layers of another kind.
     """
-    net = policy.mlp_extractor.policy_net
-    hidden = list(net.net if isinstance(net, Anchored) else net)
+    hidden = list(policy.mlp_extractor.policy_net)
     dense, between = [*hidden[::2], policy.action_net], hidden[1::2]
     if any(type(layer).__name__ != "Linear" for layer in dense) or any(type(f).__name__ != "Tanh" for f in between):
         raise ValueError(f"policy has the layers {hidden}, they must be dense with tanh between them")
-    found = [(_array(layer.weight), _array(layer.bias)) for layer in dense]
-    if isinstance(net, Anchored):  # the last bias takes f(0) away
-        features = np.zeros(found[0][0].shape[1])
-        for W, b in found[:-1]:
-            features = np.tanh(W @ features + b)
-        W, b = found[-1]
-        found[-1] = W, b - W @ features
-    return found
+    return [(_array(layer.weight), _array(layer.bias)) for layer in dense]
 
 
 def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
