@@ -1,0 +1,117 @@
+"""What the site says of commands, settings and environments, taken from them: ``<!-- generated: NAME ... -->``."""
+
+import contextlib
+import inspect
+import io
+import os
+import re
+import runpy
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import yaml
+from tabulate import tabulate
+
+import smo_gym
+from smo_gym.envs.task import HANGING, Task
+
+ROOT = Path(__file__).resolve().parents[2]
+_MARK = re.compile(r"<!-- generated: (\w+) ?(.*?) -->")
+_WIDTH = "100"
+
+
+def on_page_markdown(markdown: str, **kwargs: Any) -> str:
+    """Put what is generated into a page."""
+    return _MARK.sub(lambda mark: GENERATORS[mark[1]](*mark[2].split()), markdown)
+
+
+def commands() -> str:
+    """The help of every command."""
+    return "\n\n".join(f"## {path.name}\n\n```text\n{_help(path)}```" for path in sorted(ROOT.glob("agents/*.py")))
+
+
+def _help(path: Path) -> str:
+    main, argv = runpy.run_path(str(path))["main"], sys.argv
+    before, shown = os.environ.get("COLUMNS"), io.StringIO()
+    try:
+        sys.argv, os.environ["COLUMNS"] = [f"python agents/{path.name}"], _WIDTH
+        with contextlib.redirect_stdout(shown), contextlib.suppress(SystemExit):
+            main(["--help"])
+    finally:
+        sys.argv = argv
+        os.environ.pop("COLUMNS") if before is None else os.environ.update(COLUMNS=before)
+    return shown.getvalue().replace(f"python agents/{path.name}", path.name, 1)
+
+
+def settings() -> str:
+    """Every setting of ``configs/`` that has a source, file by file."""
+    parts = []
+    for path in sorted(ROOT.glob("configs/*.yaml")):
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        rows = [
+            (f"`{'.'.join(place)}`", f"`{one['value']}`", one["source"], one.get("note", ""))
+            for place, one in _settings(data, ())
+        ]
+        if rows:
+            table = tabulate(rows, ("setting", "value", "source", "note"), "github", disable_numparse=True)
+            base = f"\n\nExtends `{data['extends']}`: what is not here stands there." if "extends" in data else ""
+            parts.append(f"### configs/{path.name}{base}\n\n{table}")
+    return "\n\n".join(parts)
+
+
+def _settings(data: Any, place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], dict[str, Any]]]:
+    if isinstance(data, dict) and {"value", "source"} <= data.keys():
+        yield place, data
+    elif isinstance(data, dict):
+        for name, inner in data.items():
+            yield from _settings(inner, (*place, str(name)))
+
+
+def environment(name: str) -> str:
+    """A page in Gymnasium's form, from the environment that the name makes and its docstring."""
+    env = gymnasium.make(name)
+    cls = type(env.unwrapped)
+    base = smo_gym.envs.pendulum.PendulumEnv
+    facts = [
+        ("Action space", f"`{env.action_space}`"),
+        ("Observation space", f"`{env.observation_space}`"),
+        ("Control periods in an episode", env.unwrapped.task.steps),
+        ("Import", f'`import smo_gym; gymnasium.make("{name}")`'),
+    ]
+    parts = [tabulate(facts, ("", ""), "github", disable_numparse=True)]
+    if cls is not base:
+        parts += [_text(cls), _differences(env.unwrapped.task), "What follows holds for all three environments."]
+    parts += [_text(base), f"## Version History\n\n- `{name}`: the first version; smo_gym {smo_gym.__version__}"]
+    return "\n\n".join(parts)
+
+
+def _text(cls: type) -> str:
+    """A class docstring as Markdown, without the section of errors; the API reference has that."""
+    text = (inspect.getdoc(cls) or "").partition("\nRaises:")[0]
+    names = re.sub(r":(?:class|func):`~?([\w.]+)`", lambda role: f"`{role[1].rpartition('.')[2]}`", text)
+    return names.replace("``", "`").strip()
+
+
+def _differences(task: Task) -> str:
+    """The defaults that are not those of SMOPendulum-v0."""
+    rows = [
+        (f"`{f.name}`", _shown(getattr(HANGING, f.name)), _shown(getattr(task, f.name)))
+        for f in fields(Task)
+        if getattr(task, f.name) != getattr(HANGING, f.name)
+    ]
+    return "## Defaults that differ\n\n" + tabulate(
+        rows, ("argument", "SMOPendulum-v0", "here"), "github", disable_numparse=True
+    )
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, smo_gym.Reference):
+        return f"the shipped reference: {value.horizon:g} s from {list(value.x0)} to {list(value.xT)}"
+    return f"`{value}`"
+
+
+GENERATORS: dict[str, Callable[..., str]] = {"commands": commands, "settings": settings, "environment": environment}
