@@ -6,10 +6,9 @@ from typing import Any
 
 from latex2mathml.converter import convert
 
-_FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
+_FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>([.,;:)]*)', re.DOTALL)
 _TAG = re.compile(r"\\tag\{(\w+)\}")
 _FUNCTION = re.compile(r"\\(sin|cos)(\^2)?(?![a-z])\s*")
-_ACCENT = re.compile(r"<mover>(?=(?:(?!</?mover).)*<mo[^>]*>&#x(?:002D9|000A8|0007E|0005E);</mo></mover>)", re.DOTALL)
 
 
 def on_page_content(text: str, **kwargs: Any) -> str:
@@ -21,9 +20,10 @@ def _render(formula: re.Match[str]) -> str:
     kind, tex = formula[1], html.unescape(formula[2]).strip()
     number = _TAG.search(tex)
     tex = _FUNCTION.sub(r"\\,\\\1\2\\,", _TAG.sub("", tex))  # the converter leaves no space around functions
-    math = _ACCENT.sub('<mover accent="true">', convert(tex, display="inline" if kind == "span" else "block"))
-    if kind == "span":
-        return math
+    math = convert(tex, display="inline" if kind == "span" else "block")
+    math = re.sub(r"<mover[^>]*>", '<mover accent="false">', math)  # browsers draw accents into letters with ascenders
+    if kind == "span":  # a line must not begin with what follows a formula
+        return f'<span class="formula">{math}{formula[3]}</span>' if formula[3] else math
     if number is None:
         return f'<div class="equation">{math}</div>'
     anchor = f"eq-{number[1]}"
