@@ -31,20 +31,31 @@ def on_page_markdown(markdown: str, **kwargs: Any) -> str:
 
 def commands() -> str:
     """The help of every command."""
-    return "\n\n".join(f"## {path.name}\n\n```text\n{_help(path)}```" for path in sorted(ROOT.glob("agents/*.py")))
+    return "\n\n".join(f"## {path.name}\n\n{output(path.name, '--help')}" for path in sorted(ROOT.glob("agents/*.py")))
 
 
-def _help(path: Path) -> str:
-    main, argv = runpy.run_path(str(path))["main"], sys.argv
+def output(name: str, *arguments: str) -> str:
+    """What a command prints."""
+    main, argv = runpy.run_path(str(ROOT / "agents" / name))["main"], sys.argv
     before, shown = os.environ.get("COLUMNS"), io.StringIO()
     try:
-        sys.argv, os.environ["COLUMNS"] = [f"python agents/{path.name}"], _WIDTH
+        sys.argv, os.environ["COLUMNS"] = [name], _WIDTH
         with contextlib.redirect_stdout(shown), contextlib.suppress(SystemExit):
-            main(["--help"])
+            main(list(arguments))
     finally:
         sys.argv = argv
         os.environ.pop("COLUMNS") if before is None else os.environ.update(COLUMNS=before)
-    return shown.getvalue().replace(f"python agents/{path.name}", path.name, 1)
+    return f"```text\n{shown.getvalue()}```"
+
+
+def readme(*words: str) -> str:
+    """The table in a section of the README."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    section = text.partition(f"\n## {' '.join(words)}\n")[2].partition("\n## ")[0]
+    table = re.search(r"(?:^\|.*\n)+", section, re.MULTILINE)
+    if table is None:
+        raise ValueError(f"README.md has no table under {' '.join(words)!r}")
+    return table[0]
 
 
 def settings() -> str:
@@ -114,4 +125,10 @@ def _shown(value: Any) -> str:
     return f"`{value}`"
 
 
-GENERATORS: dict[str, Callable[..., str]] = {"commands": commands, "settings": settings, "environment": environment}
+GENERATORS: dict[str, Callable[..., str]] = {
+    "commands": commands,
+    "environment": environment,
+    "output": output,
+    "readme": readme,
+    "settings": settings,
+}
