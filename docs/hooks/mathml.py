@@ -11,9 +11,11 @@ _TAG = re.compile(r"\\tag\{(\w+)\}")
 _FUNCTION = re.compile(r"\\(sin|cos)(\^2)?(?![a-z])\s*")
 
 
-def on_page_content(text: str, **kwargs: Any) -> str:
+def on_page_content(text: str, page: Any, **kwargs: Any) -> str:
     """Replace what Arithmatex has marked."""
-    return _FORMULA.sub(_render, text)
+    rendered = _FORMULA.sub(_render, text)
+    page.present_anchor_ids |= set(re.findall(r'id="(eq-\w+)"', rendered))  # so that links to them are checked
+    return rendered
 
 
 def _render(formula: re.Match[str]) -> str:
