@@ -3,6 +3,7 @@
 import contextlib
 import inspect
 import io
+import math
 import os
 import re
 import runpy
@@ -109,20 +110,24 @@ def _text(cls: type) -> str:
 
 def _differences(task: Task) -> str:
     """The defaults that are not those of SMOPendulum-v0."""
-    rows = [
-        (f"`{f.name}`", _shown(getattr(HANGING, f.name)), _shown(getattr(task, f.name)))
-        for f in fields(Task)
-        if getattr(task, f.name) != getattr(HANGING, f.name)
-    ]
+    usual, here = _options(HANGING), _options(task)
+    rows = [(f"`{name}`", _shown(usual[name]), _shown(here[name])) for name in here if here[name] != usual[name]]
     return "## Defaults that differ\n\n" + tabulate(
         rows, ("argument", "SMOPendulum-v0", "here"), "github", disable_numparse=True
     )
 
 
+def _options(task: Task) -> dict[str, Any]:
+    options = {f.name: getattr(task, f.name) for f in fields(Task) if f.name != "params"}
+    return options | {f"params {name}": value for name, value in task.params.as_dict().items()}
+
+
 def _shown(value: Any) -> str:
+    if value is None or value == math.inf:
+        return "None"
     if isinstance(value, smo_gym.Reference):
         return f"the shipped reference: {value.horizon:g} s from {list(value.x0)} to {list(value.xT)}"
-    return f"`{value}`"
+    return f"`{value:.5g}`" if isinstance(value, float) else f"`{value}`"
 
 
 GENERATORS: dict[str, Callable[..., str]] = {
