@@ -15,8 +15,11 @@ def linked(text: str, scope: griffe.Object) -> str:
         short, name = role.groups()
         if name.startswith("."):  # of the same package
             name = scope.module.path.rpartition(".")[0] + name
-        target = name if name.startswith("smo_gym.") else scope.resolve(name)
         shown = f"`{name.rpartition('.')[2] if short else name}`"
+        try:
+            target = name if name.startswith("smo_gym.") else scope.resolve(name)
+        except griffe.NameResolutionError:  # inherited from another package
+            return shown
         # what has no docstring has no entry to point to
         return f"[{shown}][{target}]" if scope.modules_collection[target].has_docstring else shown
 

@@ -104,7 +104,12 @@ def environment(name: str) -> str:
 def _text(cls: type) -> str:
     """A class docstring as Markdown, without the section of errors; the API reference has that."""
     text = (inspect.getdoc(cls) or "").partition("\nRaises:")[0]
-    names = re.sub(r":(?:class|func):`~?([\w.]+)`", lambda role: f"`{role[1].rpartition('.')[2]}`", text)
+
+    def link(role: re.Match[str]) -> str:
+        name = role[1] if role[1].startswith("smo_gym.") else f"{cls.__module__}.{role[1]}"
+        return f"[`{name.rpartition('.')[2]}`][{name}]"
+
+    names = re.sub(r":(?:class|func):`~?([\w.]+)`", link, text)
     return names.replace("``", "`").strip()
 
 
