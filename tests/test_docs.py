@@ -152,6 +152,13 @@ def test_generated_pages_say_what_the_code_does(site):
     assert "133 of 138 printed numbers" in built["reproduction.html"]
 
 
+def test_every_module_is_in_the_reference(site):
+    reference = "".join(text for page, text in pages(site).items() if page.startswith("api/"))
+    for path in (ROOT / "smo_gym").rglob("[!_]*.py"):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        assert f'id="{module}"' in reference, module
+
+
 def test_relative_links_lead_somewhere():
     for page in DOCS.rglob("*.md"):
         for target in re.findall(r"\]\(([^)\s#]+?)(?:#[^)\s]*)?\)", page.read_text(encoding="utf-8")):

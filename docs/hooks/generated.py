@@ -1,4 +1,4 @@
-"""What the site says of commands, settings and environments, taken from them: ``<!-- generated: NAME ... -->``."""
+"""What the site takes from the code: commands, settings, environments, modules. ``<!-- generated: NAME ... -->``."""
 
 import contextlib
 import inspect
@@ -47,6 +47,12 @@ def output(name: str, *arguments: str) -> str:
         sys.argv = argv
         os.environ.pop("COLUMNS") if before is None else os.environ.update(COLUMNS=before)
     return f"```text\n{shown.getvalue()}```"
+
+
+def modules(package: str) -> str:
+    """The reference of every module of a package."""
+    folder = ROOT.joinpath(*package.split("."))
+    return "\n\n".join(f"::: {package}.{path.stem}" for path in sorted(folder.glob("[!_]*.py")))
 
 
 def readme(*words: str) -> str:
@@ -138,6 +144,7 @@ def _shown(value: Any) -> str:
 GENERATORS: dict[str, Callable[..., str]] = {
     "commands": commands,
     "environment": environment,
+    "modules": modules,
     "output": output,
     "readme": readme,
     "settings": settings,
