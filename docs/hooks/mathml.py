@@ -27,6 +27,6 @@ def _render(formula: re.Match[str]) -> str:
     if kind == "span":  # a line must not begin with what follows a formula
         return f'<span class="formula">{math}{formula[3]}</span>' if formula[3] else math
     if number is None:
-        return f'<div class="equation">{math}</div>'
+        return f'<div class="equation"><div>{math}</div></div>'
     anchor = f"eq-{number[1]}"
-    return f'<div class="equation" id="{anchor}">{math}<a href="#{anchor}">({number[1]})</a></div>'
+    return f'<div class="equation" id="{anchor}"><div>{math}</div><a href="#{anchor}">({number[1]})</a></div>'
