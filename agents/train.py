@@ -1,0 +1,89 @@
+"""Train a policy with PPO on what an agent can know, on plants drawn anew for every episode.
+
+    python agents/train.py --env SMOPendulum-v0 --observation smo
+
+Writes a checkpoint to --out every twentieth of the way, from which the same command resumes; at the end the policy,
+policy.safetensors, and a card of what it is, where it comes from and what it was measured to do, policy.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import platform
+import shlex
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import metadata
+from pathlib import Path
+
+from tabulate import tabulate
+from tqdm import tqdm
+
+from smo_gym.evaluation import files
+from smo_gym.learning.observations import KINDS
+
+CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+DEFAULTS = {"ppo": CONFIGS / "ppo.yaml", "recurrent": CONFIGS / "ppo_lstm.yaml"}
+PACKAGES = ("smo_gym", "gymnasium", "numpy", "stable-baselines3", "sb3-contrib", "torch")
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add("--env", default="SMOPendulum-v0", help="an environment of --config (default SMOPendulum-v0)")
+    add("--observation", help=f"{', '.join(KINDS)} (default: that of --config)")
+    add("--algo", choices=DEFAULTS, default="ppo", help="ppo (default), or recurrent: an LSTM on positions alone")
+    add("--seed", type=int, default=0, help="of weights, exploration and plants (default 0)")
+    add("--steps", type=int, metavar="N", help="control periods to learn from (default: those of --config)")
+    add("--uncertainty", type=float, metavar="X", help="level of the plants, a fraction (default: that of --config)")
+    add("--config", type=Path, metavar="FILE", help="hyperparameters (default: configs/ppo.yaml or ppo_lstm.yaml)")
+    add("--out", type=Path, metavar="DIR", help="default: runs/ENV-OBSERVATION-ALGO-SEED")
+    add("--tensorboard", action="store_true", help="write what TensorBoard shows, to DIR/tensorboard")
+    args = parser.parse_args(arguments)
+    args.config = args.config or DEFAULTS[args.algo]
+    return args
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
+    args = parse(arguments)
+    try:
+        from smo_gym.learning import training
+
+        if args.seed < 0 or (args.steps is not None and args.steps < 1):
+            raise ValueError(f"--seed {args.seed} must be at least 0 and --steps {args.steps} at least 1")
+        run = training.load(args.config, args.env, args.algo, args.observation, args.seed, args.steps, args.uncertainty)
+        name = f"{run.environment}-{run.observation}-{run.algorithm}-{run.seed}"
+        out = files.prepare(args.out or Path("runs") / name)
+        with tqdm(total=run.steps, unit="step", unit_scale=True, desc="learning", disable=None) as bar:
+
+            def show(steps: int, found: dict[str, float]) -> None:
+                bar.update(min(steps, run.steps) - bar.n)
+                bar.set_postfix({key: f"{value:.4g}" for key, value in found.items()})
+
+            policy = training.train(run, out, show, args.tensorboard)
+    except (ValueError, ImportError) as error:
+        print(f"train.py: error: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print(f"train.py: interrupted; the same command resumes from the last checkpoint in {out}", file=sys.stderr)
+        return 130
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    command = shlex.join(["python", "agents/train.py", *given])
+    versions = {"python": platform.python_version()} | {package: metadata.version(package) for package in PACKAGES}
+    card = policy.card.model_copy(update={"command": command, "versions": versions})
+    replace(policy, card=card).save(out / "policy.safetensors")
+    columns = ("steps", "runs", "failed", "mse_h", "mse_theta")
+    rows = [[point.get(column, float("nan")) for column in columns] for point in policy.card.curve]
+    print(f"While learning, over the environment's whole horizon on {rows[-1][1]} plants that learning does not see:\n")
+    print(tabulate(rows, columns, floatfmt=".4g"))
+    print(f"\nAt the end, on others: {policy.card.measured}\nThe policy is {out / 'policy.safetensors'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

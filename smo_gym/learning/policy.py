@@ -1,0 +1,227 @@
+"""A trained policy frozen to arrays: a small forward pass in NumPy, stored without pickle, run without torch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from safetensors import SafetensorError
+from safetensors.numpy import load as read_tensors
+from safetensors.numpy import save as tensor_bytes
+from scipy.special import expit
+
+from ..evaluation import files
+from ..validation import choice
+from .observations import KINDS, scaled
+
+Array = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+
+
+class Card(BaseModel):
+    """What a policy is, beside its weights.
+
+    The first part is what it computes with; the second says where it comes from.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    environment: str
+    observation: str
+    """One of :data:`~smo_gym.learning.observations.KINDS`."""
+    units: tuple[Positive, ...]
+    """Of one frame's entries: what they are divided by."""
+    frames: int = Field(ge=1)
+    layers: tuple[Annotated[int, Field(ge=1)], ...] = Field(min_length=2)
+    """Widths, inputs first; tanh between them."""
+    lstm: Annotated[int, Field(ge=1)] | None = None
+    """Width of an LSTM in front of the layers."""
+    force_limit: Positive
+    """N; what an action of 1 stands for."""
+
+    command: str = ""
+    seed: int | None = None
+    versions: dict[str, str] = {}
+    configuration: dict[str, Any] = {}
+    """The environment's options and the algorithm's hyperparameters."""
+    curve: list[dict[str, float]] = []
+    """Evaluations during training, on plants that training did not see."""
+    measured: dict[str, float] = {}
+    """The final policy on plants that neither training nor those evaluations saw."""
+
+
+@dataclass(frozen=True)
+class MlpPolicy:
+    """u = force_limit clip(W_n tanh(... tanh(W_1 o + b_1) ...) + b_n, -1, 1), o the scaled observation.
+
+    Weights are (out, in), biases (out,). A policy of positions alone also takes observations that an estimate follows,
+    and does not look at it.
+
+    Raises:
+        ValueError: an unknown kind of observation, or weights that do not fit the card.
+    """
+
+    card: Card
+    layers: Sequence[tuple[Array, Array]]
+
+    def __post_init__(self) -> None:
+        card = self.card
+        choice("observation", card.observation, KINDS)
+        wanted = list(zip(card.layers[1:], card.layers[:-1], strict=True))
+        shapes = [(W.shape, b.shape) for W, b in self.layers]
+        if shapes != [(shape, shape[:1]) for shape in wanted]:
+            raise ValueError(f"weights have shapes {[W for W, _ in shapes]}, the card asks for {wanted}")
+        told = card.lstm or card.frames * len(card.units)
+        if card.layers[0] != told or card.layers[-1] != 1:
+            raise ValueError(f"layers={card.layers} must lead from {told} inputs to one force")
+        if not all(np.isfinite(W).all() and np.isfinite(b).all() for W, b in self.layers):
+            raise ValueError("weights must be finite")
+
+    def predict(
+        self,
+        observation: Array,
+        state: tuple[Array, ...] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        """The force in N, shape (n, 1) for observations (n, observation) and (1,) for one.
+
+        Where the policy sees several frames, ``state`` carries them, (n, frames, entries); they begin anew where
+        ``episode_start`` is true, and everywhere without a state. The policy is always deterministic.
+
+        Raises:
+            ValueError: the observation is of another environment or lacks its observer.
+        """
+        frame = scaled(self._seen(np.asarray(observation)), np.array(self.card.units))
+        inputs, state = self._remember(np.atleast_2d(frame), state, episode_start)
+        for W, b in self.layers[:-1]:
+            inputs = np.tanh(inputs @ W.T + b)
+        W, b = self.layers[-1]
+        u = self.card.force_limit * np.clip(inputs @ W.T + b, -1.0, 1.0)
+        return (u if frame.ndim == 2 else u[0]), state
+
+    def _remember(
+        self, frame: Array, state: tuple[Array, ...] | None, episode_start: NDArray[np.bool_] | None
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        """Inputs of the first layer from the newest frame (n, entries) and what came before."""
+        if self.card.frames == 1:
+            return frame, state
+        repeated = np.repeat(frame[:, None], self.card.frames, axis=1)
+        frames = repeated
+        if state is not None:
+            frames = np.concatenate([state[0][:, 1:], frame[:, None]], axis=1)
+            frames = np.where(_starts(episode_start)[:, None, None], repeated, frames)
+        return frames.reshape(len(frame), -1), (frames,)
+
+    def _seen(self, observation: Array) -> Array:
+        size, given = len(self.card.units), observation.shape[-1]
+        allowed = (size,) if KINDS[self.card.observation].observer else (size, size + 4)
+        if given not in allowed:
+            raise ValueError(
+                f"observation has shape {observation.shape}: this policy of {self.card.environment} sees "
+                f"{self.card.observation!r}, {' or '.join(map(str, allowed))} entries"
+            )
+        return observation[..., :size]
+
+    def save(self, path: Path) -> None:
+        """Write ``path`` (.safetensors) and the card beside it (.json), each as a whole, the weights last."""
+        tensors: dict[str, Array] = {}
+        for k, (W, b) in enumerate(self.layers):
+            tensors |= {f"{k}.weight": np.ascontiguousarray(W), f"{k}.bias": np.ascontiguousarray(b)}
+        tensors |= self._memory()
+        files.write(path.with_suffix(".json"), json.dumps(self.card.model_dump(mode="json"), indent=1) + "\n")
+        files.write_bytes(path, tensor_bytes(tensors))
+
+    def _memory(self) -> dict[str, Array]:
+        return {}
+
+    @staticmethod
+    def load(path: Path | str) -> MlpPolicy:
+        """A policy from its weights (.safetensors) and the card of the same name (.json) beside them.
+
+        Raises:
+            ValueError: a file is missing, corrupt, or does not fit the other; it is named.
+        """
+        path = Path(path)
+        beside = path.with_suffix(".json")
+        try:
+            card = Card.model_validate_json(_read(beside))
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            raise ValueError(
+                f"{beside}: is no card of a policy ({place + ': ' if place else ''}{first['msg']})"
+            ) from None
+        try:
+            tensors = read_tensors(_read(path))
+        except SafetensorError as error:
+            raise ValueError(f"{path}: is corrupt or no safetensors file ({error})") from None
+        count = len(card.layers) - 1
+        names = {f"{k}.{part}" for k in range(count) for part in ("weight", "bias")}
+        names |= set(LSTM) if card.lstm else set()
+        if tensors.keys() != names:
+            raise ValueError(f"{path}: holds {sorted(tensors)}, the card asks for {sorted(names)}")
+        tensors = {name: tensor.astype(np.float64) for name, tensor in tensors.items()}
+        layers = [(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(count)]
+        try:
+            return LstmPolicy(card, layers, tuple(tensors[k] for k in LSTM)) if card.lstm else MlpPolicy(card, layers)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}") from None
+
+
+LSTM = ("lstm.weight_ih", "lstm.weight_hh", "lstm.bias_ih", "lstm.bias_hh")
+
+
+@dataclass(frozen=True)
+class LstmPolicy(MlpPolicy):
+    """The same behind an LSTM of width m, whose gates i, f, g, o stand below each other as torch has them.
+
+    ::
+
+        c <- sigma(f) c + sigma(i) tanh(g),   h <- sigma(o) tanh(c)
+
+    ``state`` is (h, c), each (n, m).
+
+    Args:
+        lstm: weights of the inputs (4 m, inputs) and of h (4 m, m), and the bias of each (4 m,).
+    """
+
+    lstm: tuple[Array, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        m, inputs = self.card.lstm or 0, self.card.frames * len(self.card.units)
+        wanted = [(4 * m, inputs), (4 * m, m), (4 * m,), (4 * m,)]
+        if [part.shape for part in self.lstm] != wanted:
+            raise ValueError(f"lstm has shapes {[part.shape for part in self.lstm]}, the card asks for {wanted}")
+
+    def _remember(
+        self, frame: Array, state: tuple[Array, ...] | None, episode_start: NDArray[np.bool_] | None
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        W, U, b, d = self.lstm
+        h, c = state or (np.zeros((len(frame), U.shape[1])),) * 2
+        keep = ~_starts(episode_start)[..., None]
+        i, f, g, o = np.split(frame @ W.T + b + (h * keep) @ U.T + d, 4, axis=1)
+        c = expit(f) * c * keep + expit(i) * np.tanh(g)
+        h = expit(o) * np.tanh(c)
+        return h, (h, c)
+
+    def _memory(self) -> dict[str, Array]:
+        return dict(zip(LSTM, self.lstm, strict=True))
+
+
+def _starts(episode_start: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    return np.atleast_1d(np.asarray(False if episode_start is None else episode_start, dtype=np.bool_))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None

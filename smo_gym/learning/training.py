@@ -1,0 +1,293 @@
+"""Training runs: settings in rl-baselines3-zoo's shape, checkpoints to resume from, evaluation on unseen plants."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import yaml
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from ..evaluation import files
+from ..evaluation.rollout import rollout
+from ..validation import choice, mapping
+from ..wrappers import VectorObserverWrapper
+from .observations import KINDS, VectorAgentView, units
+from .policy import Card, LstmPolicy, MlpPolicy
+from .sb3 import SB3VecEnv, layers, lstm_weights
+
+try:
+    from sb3_contrib import RecurrentPPO
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.utils import LinearSchedule
+    from stable_baselines3.common.vec_env import VecMonitor
+except ImportError as error:
+    raise ImportError('training needs Stable-Baselines3 and sb3-contrib: pip install "smo_gym[rl]"') from error
+
+Array = NDArray[np.float64]
+
+ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "recurrent": RecurrentPPO}
+VIEW = "smo_gym.learning.observations.agent_view"
+TRAINING, VALIDATION, TEST = range(3)
+"""Streams of seeds: what a policy learns on, is watched on while it learns, and is measured on at the end."""
+CHECKPOINTS = 20
+
+
+@dataclass(frozen=True)
+class Run:
+    """All that a trained policy depends on."""
+
+    environment: str
+    observation: str
+    algorithm: str
+    seed: int
+    steps: int
+    n_envs: int
+    options: dict[str, Any]
+    """Of the environment."""
+    hyperparameters: dict[str, Any]
+    """Of the algorithm."""
+
+    def checked(self) -> Run:
+        """Itself, when an environment and an algorithm can be made of it.
+
+        Raises:
+            ValueError: a name or value that is not allowed.
+        """
+        choice("observation", self.observation, KINDS)
+        if self.algorithm == "recurrent" and self.observation != "positions":
+            raise ValueError(f"observation={self.observation!r}: the recurrent algorithm is for 'positions' alone")
+        known = set(inspect.signature(ALGORITHMS[self.algorithm].__init__).parameters) - {"self", "env", "seed"}
+        mapping("hyperparameter", self.hyperparameters, known)
+        counts = {"n_envs": self.n_envs, "n_timesteps": self.steps, "n_steps": self.hyperparameters.get("n_steps")}
+        for name, value in counts.items():
+            if not isinstance(value, int) or value < 1:
+                raise ValueError(f"{name}={value!r} must be a whole number of at least 1")
+        _built(self)
+        make(self, 1, AutoresetMode.SAME_STEP).close()
+        return self
+
+
+def load(
+    path: Path,
+    environment: str,
+    algorithm: str,
+    observation: str | None = None,
+    seed: int = 0,
+    steps: int | None = None,
+    uncertainty: float | None = None,
+) -> Run:
+    """A run from a file of hyperparameters in rl-baselines3-zoo's shape; what is given here takes their place.
+
+    Raises:
+        ValueError: the file cannot be read, or an unknown, missing or bad value.
+    """
+    try:
+        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: is not YAML ({' '.join(str(error).split())})") from None
+    try:
+        if not isinstance(data, dict):
+            raise ValueError("must be a mapping of environments to hyperparameters")
+        entry = data[choice("environment", environment, data)]
+        given = dict(entry) if isinstance(entry, dict) else {}
+        if missing := {"n_envs", "n_timesteps", "policy", "env_wrapper"} - given.keys():
+            raise ValueError(f"{environment} lacks {', '.join(sorted(missing))}")
+        wrapper = given.pop("env_wrapper")
+        if not isinstance(wrapper, list) or len(wrapper) != 1 or list(wrapper[0]) != [VIEW]:
+            raise ValueError(
+                f"{environment}: env_wrapper={wrapper!r} must be a list of {VIEW} with its arguments alone"
+            )
+        options = given.pop("env_kwargs", {}) | ({} if uncertainty is None else {"uncertainty": uncertainty})
+        n_envs, n_timesteps = given.pop("n_envs"), given.pop("n_timesteps")
+        kind = observation or wrapper[0][VIEW]["observation"]
+        return Run(environment, kind, algorithm, seed, int(steps or n_timesteps), int(n_envs), options, given).checked()
+    except (ValueError, TypeError, gymnasium.error.Error) as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def make(run: Run, n: int, mode: AutoresetMode, **others: Any) -> VectorEnv[Any, Any, Any]:
+    """The run's environment as an agent sees it."""
+    env = gymnasium.make_vec(run.environment, n, autoreset_mode=mode, **{**run.options, **others})
+    return VectorAgentView(env, run.observation)
+
+
+def seeds(stream: int, n: int, *key: int) -> list[int]:
+    """N seeds of a stream."""
+    return [int(seed) for seed in np.random.SeedSequence(key, spawn_key=(stream,)).generate_state(n)]
+
+
+def measure(policy: MlpPolicy, stream: int = TEST, runs: int = 100, horizon: float | None = None) -> dict[str, float]:
+    """A policy on random plants and starts of its training, over the environment's own horizon or another.
+
+    Returns:
+        Runs, how many failed, and the means of the others' MSE of h in m^2 and of theta in rad^2.
+    """
+    card = policy.card
+    options = {name: value for name, value in card.configuration["options"].items() if name != "horizon"}
+    options |= {} if horizon is None else {"horizon": horizon}
+    env = gymnasium.make_vec(card.environment, runs, autoreset_mode=AutoresetMode.DISABLED, **options)
+    observer = KINDS[card.observation].observer
+    outcome = rollout(VectorObserverWrapper(env, **observer) if observer else env, policy, seed=seeds(stream, 1)[0])
+    stood = ~outcome.failed
+    means = {name: float(outcome.metrics[name][stood].mean()) for name in ("mse_h", "mse_theta")} if stood.any() else {}
+    return {"runs": runs, "failed": int(outcome.failed.sum()), **means}
+
+
+def frozen(model: Any, run: Run) -> MlpPolicy:
+    """The policy that a model would act by, without exploration."""
+    actor = model.policy
+    weights, lstm = layers(actor), getattr(actor, "lstm_actor", None)
+    env = make(run, 1, AutoresetMode.SAME_STEP)
+    force_limit = env.unwrapped.task.force_limit  # type: ignore[attr-defined]
+    frames = KINDS[run.observation].frames
+    inputs = env.single_observation_space.shape[0]  # type: ignore[index]
+    card = Card(
+        environment=run.environment,
+        observation=run.observation,
+        units=tuple(units(inputs // frames).tolist()),
+        frames=frames,
+        layers=(*(W.shape[1] for W, _ in weights), 1),
+        lstm=lstm.hidden_size if lstm else None,
+        force_limit=force_limit,
+        seed=run.seed,
+        configuration=asdict(run),
+    )
+    return LstmPolicy(card, weights, lstm_weights(lstm)) if lstm else MlpPolicy(card, weights)
+
+
+class Watch(BaseCallback):
+    """Every twentieth of a run: evaluate, keep a checkpoint, and begin afresh with seeds of that place.
+
+    So what follows a checkpoint depends on the checkpoint alone: an interrupted run ends where an uninterrupted one
+    does, on the same machine and number of threads.
+    """
+
+    def __init__(self, run: Run, checkpoint: Path, progress: Callable[[int, dict[str, float]], object]) -> None:
+        super().__init__()
+        self._run, self._checkpoint, self._progress = run, checkpoint, progress
+        rollout_steps = run.n_envs * int(run.hyperparameters["n_steps"])
+        self._every = rollout_steps * max(1, round(run.steps / rollout_steps / CHECKPOINTS))
+        self._fresh = True
+
+    def _on_rollout_start(self) -> None:
+        if self.num_timesteps % self._every == 0:
+            if not self._fresh:
+                self.keep()
+            self._restart()
+        self._fresh = False
+
+    def keep(self) -> None:
+        """Evaluate and write a checkpoint."""
+        found = measure(frozen(self.model, self._run), VALIDATION)
+        self.model.curve = [*curve(self.model), {"steps": self.num_timesteps, **found}]  # type: ignore[attr-defined]
+        for name, value in found.items():
+            self.logger.record(f"validation/{name}", value)
+        half = self._checkpoint.with_suffix(".half.zip")
+        self.model.save(half)
+        os.replace(half, self._checkpoint)
+        self._progress(self.num_timesteps, found)
+
+    def _restart(self) -> None:
+        seed = seeds(TRAINING, 1, self._run.seed, self.num_timesteps)[0]
+        self.model.set_random_seed(seed)
+        self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
+        self.model._last_episode_starts = np.ones(self._run.n_envs, dtype=np.bool_)
+
+    def _on_step(self) -> bool:
+        return True
+
+
+def curve(model: Any) -> list[dict[str, float]]:
+    """What the evaluations of a model during its training gave."""
+    return list(getattr(model, "curve", []))
+
+
+def train(
+    run: Run,
+    folder: Path,
+    progress: Callable[[int, dict[str, float]], object] = lambda steps, found: None,
+    tensorboard: bool = False,
+) -> MlpPolicy:
+    """Train, or go on from the checkpoint in ``folder``.
+
+    Args:
+        run: what to train.
+        folder: of the checkpoint, which holds a run of exactly these settings or none.
+        progress: called at every checkpoint with the steps done and what the policy was then.
+        tensorboard: write what TensorBoard shows, too.
+
+    Returns:
+        The final policy with its curve and measured result on its card.
+
+    Raises:
+        ValueError: the folder holds a run of other settings, or a checkpoint that cannot be read.
+    """
+    agree(folder / "run.json", asdict(run))
+    checkpoint = folder / "checkpoint.zip"
+    env = VecMonitor(SB3VecEnv(make(run, run.n_envs, AutoresetMode.SAME_STEP)))
+    log = str(folder / "tensorboard") if tensorboard else None
+    algorithm = ALGORITHMS[run.algorithm]
+    if checkpoint.exists():
+        try:
+            model = algorithm.load(checkpoint, env=env, device="cpu", tensorboard_log=log)
+        except Exception as error:  # whatever a damaged zip and pickle may raise
+            raise ValueError(f"{checkpoint}: cannot be read ({error}): remove it to begin anew") from None
+    else:
+        model = algorithm(
+            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **_built(run)
+        )
+    watch = Watch(run, checkpoint, progress)
+    progress(model.num_timesteps, {})
+    if model.num_timesteps < run.steps:
+        model.learn(run.steps - model.num_timesteps, callback=watch, reset_num_timesteps=False, tb_log_name="run")
+        watch.keep()
+    policy = frozen(model, run)
+    card = policy.card.model_copy(update={"curve": curve(model), "measured": measure(policy)})
+    return replace(policy, card=card)
+
+
+def agree(path: Path, settings: dict[str, Any]) -> None:
+    """Write the settings of a run, or see that those that stand there are the same.
+
+    Raises:
+        ValueError: they are not; the differences are named.
+    """
+    wanted = json.loads(json.dumps(settings))
+    if not path.exists():
+        files.write(path, json.dumps(wanted, indent=1) + "\n")
+        return
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError) as error:
+        raise ValueError(f"{path}: cannot be read ({error})") from None
+    if found != wanted:
+        differences = [
+            f"{name} is {found.get(name)!r} there and {wanted.get(name)!r} here"
+            for name in wanted | found
+            if found.get(name) != wanted.get(name)
+        ]
+        raise ValueError(f"{path.parent} holds a run with another configuration: {'; '.join(differences)}")
+
+
+def _built(run: Run) -> dict[str, Any]:
+    """Hyperparameters with the zoo's schedules: lin_1e-3 falls from 1e-3 to 0."""
+    built = dict(run.hyperparameters)
+    for name, value in built.items():
+        if isinstance(value, str) and value.startswith("lin_"):
+            try:
+                built[name] = LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
+            except ValueError:
+                raise ValueError(f"{name}={value!r} must be a number, or lin_ and a number") from None
+    return built

@@ -1,0 +1,141 @@
+"""Frozen policies: the same actions as the library's, and files that are checked."""
+
+import json
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from sb3_contrib import RecurrentPPO
+from stable_baselines3 import PPO
+
+from smo_gym import ObserverWrapper
+from smo_gym.learning import MlpPolicy
+from smo_gym.learning.observations import KINDS, agent_view
+from smo_gym.learning.policy import Card
+from smo_gym.learning.training import Run, frozen
+
+SMALL = {"policy": "MlpPolicy", "n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [16, 8]}}
+RECURRENT = {
+    "policy": "MlpLstmPolicy",
+    "n_steps": 8,
+    "batch_size": 8,
+    "policy_kwargs": {"net_arch": [8], "lstm_hidden_size": 12},
+}
+
+
+def untrained(observation="smo", algorithm="ppo", **options):
+    """A model with random weights that move the force, and its frozen policy."""
+    hyperparameters = RECURRENT if algorithm == "recurrent" else SMALL
+    run = Run("SMOPendulum-v0", observation, algorithm, 0, 64, 1, options, hyperparameters)
+    env = agent_view(gymnasium.make(run.environment, **options), observation)
+    model = (RecurrentPPO if algorithm == "recurrent" else PPO)(env=env, seed=1, device="cpu", **hyperparameters)
+    for parameter in model.policy.parameters():
+        parameter.data.normal_(0.0, 0.3)
+    return model, frozen(model, run)
+
+
+@pytest.mark.parametrize(("observation", "algorithm"), [*((kind, "ppo") for kind in KINDS), ("positions", "recurrent")])
+def test_it_acts_as_the_model_it_was_made_of(observation, algorithm):
+    model, policy = untrained(observation, algorithm, force_limit=20.0)
+    kind = KINDS[observation]
+    learner = agent_view(gymnasium.make("SMOPendulum-v0", force_limit=20.0), observation)
+    plant = gymnasium.make("SMOPendulum-v0", force_limit=20.0)
+    plant = ObserverWrapper(plant, **kind.observer) if kind.observer else plant
+    seen, _ = learner.reset(seed=2)
+    told, _ = plant.reset(seed=2)
+    forces, states, start = [], [None, None], np.array([True])
+    for _ in range(30):
+        action, states[0] = model.predict(seen, states[0], start, deterministic=True)
+        force, states[1] = policy.predict(told, states[1], start)
+        assert force == pytest.approx(20.0 * action, abs=2e-3)
+        forces.append(force[0])
+        seen, *_ = learner.step(action)
+        told, *_ = plant.step(20.0 * action.astype(np.float64))
+        start = np.array([False])
+    assert np.ptp(forces) > 0.1
+
+
+@pytest.mark.parametrize(("observation", "algorithm"), [("stacked", "ppo"), ("positions", "recurrent")])
+def test_memory_begins_anew_where_an_episode_does(observation, algorithm):
+    _, policy = untrained(observation, algorithm)
+    rng = np.random.default_rng(0)
+    state, told = None, rng.normal(size=(5, 3, 2))
+    for observation_ in told[:-1]:
+        _, state = policy.predict(observation_, state, np.zeros(3, dtype=bool))
+    kept, _ = policy.predict(told[-1], state, np.zeros(3, dtype=bool))
+    mixed, _ = policy.predict(told[-1], state, np.array([False, True, False]))
+    fresh, _ = policy.predict(told[-1])
+    assert np.allclose(mixed[[0, 2]], kept[[0, 2]], atol=1e-12)
+    assert np.allclose(mixed[1], fresh[1], atol=1e-12)
+    assert not np.allclose(kept[1], fresh[1])
+    alone, _ = policy.predict(told[-1, 1])
+    assert alone.shape == (1,)
+    assert alone == pytest.approx(fresh[1], abs=1e-12)
+
+
+def test_forces_are_clipped_and_finite():
+    card = Card(environment="e", observation="positions", units=(1, 1), frames=1, layers=(2, 1), force_limit=5.0)
+    policy = MlpPolicy(card, [(np.array([[2.0, 0.0]]), np.array([0.0]))])
+    forces, _ = policy.predict(np.array([[1.0, 0.0], [-9.0, 0.0], [0.25, np.nan]]))
+    assert forces.tolist() == [[5.0], [-5.0], [2.5]]
+
+
+def test_positions_alone_do_not_look_at_an_estimate():
+    _, policy = untrained("positions")
+    told = np.random.default_rng(0).normal(size=(4, 6))
+    assert np.array_equal(policy.predict(told)[0], policy.predict(told[:, :2])[0])
+    with pytest.raises(ValueError, match=r"shape \(4, 3\).*'positions', 2 or 6 entries"):
+        policy.predict(told[:, :3])
+    _, policy = untrained("smo")
+    with pytest.raises(ValueError, match=r"'smo', 6 entries"):
+        policy.predict(told[:, :2])
+
+
+@pytest.mark.parametrize(("observation", "algorithm"), [("stacked", "ppo"), ("positions", "recurrent")])
+def test_files_keep_everything(observation, algorithm, tmp_path):
+    _, policy = untrained(observation, algorithm)
+    policy.save(tmp_path / "a.safetensors")
+    again = MlpPolicy.load(tmp_path / "a.safetensors")
+    assert type(again) is type(policy)
+    assert again.card == policy.card
+    told = np.random.default_rng(0).normal(size=(4, 2))
+    assert np.array_equal(again.predict(told)[0], policy.predict(told)[0])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.json", "a.safetensors"]
+
+
+def test_bad_files_are_named(tmp_path):
+    path = tmp_path / "a.safetensors"
+    with pytest.raises(ValueError, match=r"a\.json: cannot be read"):
+        MlpPolicy.load(path)
+    _, policy = untrained()
+    policy.save(path)
+    weights, card = path.read_bytes(), json.loads(path.with_suffix(".json").read_text())
+    path.unlink()
+    with pytest.raises(ValueError, match=r"a\.safetensors: cannot be read"):
+        MlpPolicy.load(path)
+    for damaged in (weights[:-9], b"", b"PK\x03\x04" + weights):
+        path.write_bytes(damaged)
+        with pytest.raises(ValueError, match=r"a\.safetensors: is corrupt"):
+            MlpPolicy.load(path)
+    path.write_bytes(weights)
+    for change, message in [
+        ({"layers": [6, 16, 9, 1]}, r"a\.safetensors: weights have shapes .* asks for"),
+        ({"layers": [6, 8, 1]}, r"a\.safetensors: holds .* asks for"),
+        ({"units": [1.0, 1.0]}, r"a\.safetensors: layers=.* must lead from 2 inputs"),
+        ({"observation": "smoo"}, r"did you mean 'smo'"),
+        ({"frames": 0}, r"a\.json: is no card of a policy \(frames: "),
+        ({"lstm": 3}, r"a\.safetensors: holds .* asks for"),
+    ]:
+        path.with_suffix(".json").write_text(json.dumps(card | change))
+        with pytest.raises(ValueError, match=message):
+            MlpPolicy.load(path)
+    path.with_suffix(".json").write_text("{")
+    with pytest.raises(ValueError, match=r"a\.json: is no card of a policy"):
+        MlpPolicy.load(path)
+
+
+def test_nothing_of_torch_is_needed():
+    code = "import sys, smo_gym.learning as l; l.shipped('SMOPendulum-v0'); assert 'torch' not in sys.modules"
+    subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)

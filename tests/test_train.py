@@ -1,0 +1,152 @@
+"""Training runs: resumed, watched on other plants, exported; and bad input."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from smo_gym.learning import MlpPolicy, training
+
+ROOT = Path(__file__).resolve().parent.parent
+CONFIGS = ROOT / "configs"
+spec = importlib.util.spec_from_file_location("train", ROOT / "agents" / "train.py")
+train = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(train)
+
+
+@pytest.fixture
+def command(tmp_path):
+    """A command line that trains for some tenths of a second: two checkpoints on the way."""
+    small = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
+    small["SMOPendulum-v0"] |= {"n_envs": 8, "n_timesteps": 96, "n_steps": 4, "batch_size": 32, "n_epochs": 1}
+    (tmp_path / "small.yaml").write_text(yaml.safe_dump(small))
+
+    def command(*arguments, out="run"):
+        return train.main(["--config", str(tmp_path / "small.yaml"), "--out", str(tmp_path / out), *arguments])
+
+    return command
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch):
+    """Evaluations over a second."""
+    measure = training.measure
+    monkeypatch.setattr(training, "measure", lambda policy, stream=training.TEST: measure(policy, stream, 5, 1.0))
+
+
+def test_an_interrupted_run_ends_where_an_uninterrupted_one_does(command, tmp_path, monkeypatch, capsys):
+    assert command(out="whole") == 0
+    keep = training.Watch.keep
+
+    def interrupt(watch):
+        keep(watch)
+        if watch.num_timesteps == 64:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(training.Watch, "keep", interrupt)
+    assert command() == 130
+    assert "resumes" in capsys.readouterr().err
+    assert not (tmp_path / "run/policy.safetensors").exists()
+    monkeypatch.setattr(training.Watch, "keep", keep)
+    assert command() == 0
+    whole, resumed = (MlpPolicy.load(tmp_path / name / "policy.safetensors") for name in ("whole", "run"))
+    assert all(np.array_equal(W, V) for (W, _), (V, _) in zip(whole.layers, resumed.layers, strict=True))
+    assert whole.card.curve == resumed.card.curve
+    assert [point["steps"] for point in whole.card.curve] == [32, 64, 96]
+    assert whole.card.measured == resumed.card.measured
+    assert whole.card.command.startswith("python agents/train.py --config ")
+    assert whole.card.configuration["options"]["uncertainty"] == 0.2
+    before = (tmp_path / "run/policy.safetensors").read_bytes()
+    assert command() == 0  # nothing is left to do
+    assert (tmp_path / "run/policy.safetensors").read_bytes() == before
+
+
+def test_seeds_lead_to_other_policies(command, tmp_path):
+    policies = []
+    for seed in ("0", "1"):
+        assert command("--seed", seed, "--steps", "32", out=seed) == 0
+        policies.append(MlpPolicy.load(tmp_path / seed / "policy.safetensors"))
+    assert not np.array_equal(policies[0].layers[0][0], policies[1].layers[0][0])
+
+
+def test_another_configuration_does_not_resume(command, capsys):
+    assert command() == 0
+    assert command("--seed", "3", "--uncertainty", "0.1") == 2
+    message = capsys.readouterr().err
+    assert "another configuration: seed is 0 there and 3 here; options is" in message
+
+
+def test_a_damaged_checkpoint_is_named(command, tmp_path, capsys):
+    assert command("--steps", "32") == 0
+    checkpoint = tmp_path / "run/checkpoint.zip"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:-40])
+    assert command("--steps", "32") == 2
+    assert "checkpoint.zip: cannot be read" in capsys.readouterr().err
+
+
+def test_streams_of_seeds_share_nothing():
+    learned = {seed for steps in range(0, 320, 32) for seed in training.seeds(training.TRAINING, 4, 0, steps)}
+    others = [set(training.seeds(stream, 4)) for stream in (training.VALIDATION, training.TEST)]
+    assert len(learned) == 40
+    assert not learned & others[0]
+    assert not others[0] & others[1]
+
+
+def test_the_recurrent_algorithm_learns_and_is_exported(tmp_path, monkeypatch):
+    run = training.load(CONFIGS / "ppo_lstm.yaml", "SMOPendulum-v0", "recurrent", steps=32)
+    small = training.replace(
+        run, n_envs=4, hyperparameters=run.hyperparameters | {"n_steps": 8, "batch_size": 16, "n_epochs": 1}
+    )
+    policy = training.train(small, tmp_path)
+    assert policy.card.lstm == 64
+    assert policy.card.observation == "positions"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--env", "SMOPendulum-v1"], "unknown environment 'SMOPendulum-v1': did you mean 'SMOPendulum-v0'"),
+        (["--observation", "positons"], "did you mean 'positions'"),
+        (["--algo", "recurrent", "--observation", "smo"], "is for 'positions' alone"),
+        (["--uncertainty", "1.5"], "uncertainty=1.5 must be a fraction"),
+        (["--seed", "-1"], "--seed -1 must be at least 0"),
+        (["--config", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
+    ],
+)
+def test_bad_arguments(arguments, message, tmp_path, capsys):
+    assert train.main([*arguments, "--out", str(tmp_path / "run")]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("train.py: error: ")
+    assert message in error
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"learning_rat": 1e-3}, "unknown hyperparameter 'learning_rat': did you mean 'learning_rate'"),
+        ({"env_wrapper": ["a.b"]}, "env_wrapper="),
+        ({"env_kwargs": {"horizn": 1.0}}, "did you mean 'horizon'"),
+        ({"n_steps": "many"}, "n_steps='many' must be"),
+        ({"learning_rate": "lin_fast"}, "learning_rate"),
+    ],
+)
+def test_bad_settings(change, message, tmp_path, capsys):
+    data = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
+    data["SMOPendulum-v0"] |= change
+    (tmp_path / "bad.yaml").write_text(yaml.safe_dump(data))
+    assert train.main(["--config", str(tmp_path / "bad.yaml"), "--out", str(tmp_path / "run")]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_missing_extra_is_named(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
+    for name in ("training", "sb3"):
+        monkeypatch.delitem(sys.modules, f"smo_gym.learning.{name}", raising=False)
+    monkeypatch.delattr("smo_gym.learning.training")
+    assert train.main([]) == 2
+    assert 'pip install "smo_gym[rl]"' in capsys.readouterr().err
