@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from smo_gym.learning import MlpPolicy, training
+from smo_gym.learning import MlpPolicy, measurement, training
 
 ROOT = Path(__file__).resolve().parent.parent
 CONFIGS = ROOT / "configs"
@@ -34,7 +34,7 @@ def command(tmp_path):
 def short(monkeypatch):
     """Evaluations over a second."""
     measure = training.measure
-    monkeypatch.setattr(training, "measure", lambda policy, stream=training.TEST: measure(policy, stream, 5, 1.0))
+    monkeypatch.setattr(training, "measure", lambda policy, stream=measurement.TEST: measure(policy, stream, 5, 1.0))
 
 
 def test_an_interrupted_run_ends_where_an_uninterrupted_one_does(command, tmp_path, monkeypatch, capsys):
@@ -88,8 +88,8 @@ def test_a_damaged_checkpoint_is_named(command, tmp_path, capsys):
 
 
 def test_streams_of_seeds_share_nothing():
-    learned = {seed for steps in range(0, 320, 32) for seed in training.seeds(training.TRAINING, 4, 0, steps)}
-    others = [set(training.seeds(stream, 4)) for stream in (training.VALIDATION, training.TEST)]
+    learned = {seed for steps in range(0, 320, 32) for seed in measurement.seeds(measurement.TRAINING, 4, 0, steps)}
+    others = [set(measurement.seeds(stream, 4)) for stream in (measurement.VALIDATION, measurement.TEST)]
     assert len(learned) == 40
     assert not learned & others[0]
     assert not others[0] & others[1]

@@ -46,7 +46,7 @@ class Kind:
 
 LIMIT = 10.0
 """Where scaled observations are clipped (chosen). An estimate that has diverged to NaN, as it may when a rod spins too
-fast for the observer's gains, is told as 0."""
+fast for the observer's gains, is told as this limit."""
 
 # The slopes are those that the article's LQR tables identify (configs/article.yaml), the gains Table 3's.
 _SMO = {"observer": "smo", "gains": "lqr", "slopes": (12.5, 12.5)}
@@ -69,7 +69,7 @@ def units(size: int) -> Array:
 
 def scaled(observation: Array, units: Array) -> Array:
     """The observation in its units, finite and bounded."""
-    return np.nan_to_num(np.clip(observation / units, -LIMIT, LIMIT))
+    return np.fmax(np.fmin(observation / units, LIMIT), -LIMIT)  # unlike clip they leave no NaN
 
 
 def agent_view(env: gymnasium.Env[Array, Array], observation: str = "smo") -> gymnasium.Env[Any, Any]:

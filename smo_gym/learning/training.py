@@ -17,9 +17,8 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from ..evaluation import files
-from ..evaluation.rollout import rollout
 from ..validation import choice, mapping
-from ..wrappers import VectorObserverWrapper
+from .measurement import TRAINING, VALIDATION, measure, seeds
 from .observations import KINDS, VectorAgentView, units
 from .policy import Card, LstmPolicy, MlpPolicy
 from .sb3 import SB3VecEnv, layers, lstm_weights
@@ -37,8 +36,6 @@ Array = NDArray[np.float64]
 
 ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "recurrent": RecurrentPPO}
 VIEW = "smo_gym.learning.observations.agent_view"
-TRAINING, VALIDATION, TEST = range(3)
-"""Streams of seeds: what a policy learns on, is watched on while it learns, and is measured on at the end."""
 CHECKPOINTS = 20
 
 
@@ -121,28 +118,6 @@ def make(run: Run, n: int, mode: AutoresetMode, **others: Any) -> VectorEnv[Any,
     """The run's environment as an agent sees it."""
     env = gymnasium.make_vec(run.environment, n, autoreset_mode=mode, **{**run.options, **others})
     return VectorAgentView(env, run.observation)
-
-
-def seeds(stream: int, n: int, *key: int) -> list[int]:
-    """N seeds of a stream."""
-    return [int(seed) for seed in np.random.SeedSequence(key, spawn_key=(stream,)).generate_state(n)]
-
-
-def measure(policy: MlpPolicy, stream: int = TEST, runs: int = 100, horizon: float | None = None) -> dict[str, float]:
-    """A policy on random plants and starts of its training, over the environment's own horizon or another.
-
-    Returns:
-        Runs, how many failed, and the means of the others' MSE of h in m^2 and of theta in rad^2.
-    """
-    card = policy.card
-    options = {name: value for name, value in card.configuration["options"].items() if name != "horizon"}
-    options |= {} if horizon is None else {"horizon": horizon}
-    env = gymnasium.make_vec(card.environment, runs, autoreset_mode=AutoresetMode.DISABLED, **options)
-    observer = KINDS[card.observation].observer
-    outcome = rollout(VectorObserverWrapper(env, **observer) if observer else env, policy, seed=seeds(stream, 1)[0])
-    stood = ~outcome.failed
-    means = {name: float(outcome.metrics[name][stood].mean()) for name in ("mse_h", "mse_theta")} if stood.any() else {}
-    return {"runs": runs, "failed": int(outcome.failed.sum()), **means}
 
 
 def frozen(model: Any, run: Run) -> MlpPolicy:
