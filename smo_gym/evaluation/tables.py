@@ -128,7 +128,7 @@ def results_csv(results: Sequence[Result]) -> str:
     """One line a result: the columns of the published data, then what stands beside it."""
     numbers = ("published", "measured", "ci_low", "ci_high", "runs", "failures", "median")
     header = [*(field.name for field in fields(Cell)), *numbers]
-    return _csv(header, ([*asdict(r.cell).values(), *(_exact(getattr(r, name)) for name in numbers)] for r in results))
+    return as_csv(header, ([*asdict(r.cell).values(), *(exact(getattr(r, name)) for name in numbers)] for r in results))
 
 
 def runs_csv(outcomes: Sequence[Outcome]) -> str:
@@ -140,12 +140,13 @@ def runs_csv(outcomes: Sequence[Outcome]) -> str:
             group = outcome.group
             place = [group.scenario.table, group.name, group.uncertainty, group.case, group.arm]
             for run, failed in enumerate(outcome.failed):
-                yield [*place, run, int(failed), *(_exact(outcome.metrics[name][run]) for name in NAMES)]
+                yield [*place, run, int(failed), *(exact(outcome.metrics[name][run]) for name in NAMES)]
 
-    return _csv(header, lines())
+    return as_csv(header, lines())
 
 
-def _csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
+def as_csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
+    """A header and lines as CSV."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(header)
@@ -153,7 +154,7 @@ def _csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
     return file.getvalue()
 
 
-def _exact(value: float) -> object:
+def exact(value: float) -> object:
     """The shortest text that reads back as the same number; empty for none."""
     if isinstance(value, int):
         return value
