@@ -104,9 +104,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"{words}\n\nresults are in {out}")
     told = (
         "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
-        f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. LQR and "
-        f"SMC act every {place.control_period.value:g} s, policies as in their training. A failed run counts as the "
-        "worst.\n"
+        f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. LQR "
+        f"and SMC act every {place.control_period.value:g} s, policies as in their training. A failed run counts as "
+        "the worst.\n"
     )
     files.write(out / "learning.md", f"{told}\n{table.render(rows, levels, 'github')}\n{words}\n")
     files.write(out / "learning.csv", table.aggregate_csv(rows, levels))

@@ -98,9 +98,8 @@ def sentence(comparison: Comparison) -> str:
 
     return (
         f"{a.contender.title} against {b.contender.title}: {comparison.verdict}. Its interquartile mean is "
-        f"{ratio.value:.3g}{span(ratio.low, ratio.high)} times the other's, and it has the lower score on the same plant "
-        f"with probability "
-        f"{probability.value:.3g}{span(probability.low, probability.high)}."
+        f"{ratio.value:.3g}{span(ratio.low, ratio.high)} times the other's, and it has the lower score on the same "
+        f"plant with probability {probability.value:.3g}{span(probability.low, probability.high)}."
     )
 
 
