@@ -62,8 +62,8 @@ def render(rows: Sequence[Row], levels: Sequence[float], form: str) -> str:
 
 def _steps(row: Row) -> str:
     """What each policy learned from, control periods."""
-    steps = {card.configuration.get("steps") for card in row.scores.contender.cards}
-    return f"{steps.pop():,}" if steps else ""
+    steps = [card.configuration.get("steps") for card in row.scores.contender.cards]
+    return f"{steps[0]:,}" if steps and isinstance(steps[0], int) else ""
 
 
 def _span(one: Estimate) -> str:
