@@ -81,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows = [[point.get(column, float("nan")) for column in columns] for point in policy.card.curve]
     print(f"While learning, over the environment's whole horizon on {rows[-1][1]} plants that learning does not see:\n")
     print(tabulate(rows, columns, floatfmt=".4g"))
-    print(f"\nAt the end, on others: {policy.card.measured}\nThe policy is {out / 'policy.safetensors'}")
+    print(f"\nThe best of them, on others: {policy.card.measured}\nThe policy is {out / 'policy.safetensors'}")
     return 0
 
 

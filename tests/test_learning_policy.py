@@ -14,9 +14,14 @@ from smo_gym import ObserverWrapper
 from smo_gym.learning import MlpPolicy
 from smo_gym.learning.observations import KINDS, agent_view
 from smo_gym.learning.policy import Card
-from smo_gym.learning.training import Run, frozen
+from smo_gym.learning.training import Run, built, frozen
 
-SMALL = {"policy": "MlpPolicy", "n_steps": 8, "batch_size": 8, "policy_kwargs": {"net_arch": [16, 8]}}
+SMALL = {
+    "policy": "MlpPolicy",
+    "n_steps": 8,
+    "batch_size": 8,
+    "policy_kwargs": {"net_arch": [16, 8]},
+}
 RECURRENT = {
     "policy": "MlpLstmPolicy",
     "n_steps": 8,
@@ -30,7 +35,7 @@ def untrained(observation="smo", algorithm="ppo", **options):
     hyperparameters = RECURRENT if algorithm == "recurrent" else SMALL
     run = Run("SMOPendulum-v0", observation, algorithm, 0, 64, 1, options, hyperparameters)
     env = agent_view(gymnasium.make(run.environment, **options), observation)
-    model = (RecurrentPPO if algorithm == "recurrent" else PPO)(env=env, seed=1, device="cpu", **hyperparameters)
+    model = (RecurrentPPO if algorithm == "recurrent" else PPO)(env=env, seed=1, device="cpu", **built(run))
     for parameter in model.policy.parameters():
         parameter.data.normal_(0.0, 0.3)
     return model, frozen(model, run)

@@ -54,7 +54,7 @@ class Card(BaseModel):
     curve: list[dict[str, float]] = []
     """Evaluations during training, on plants that training did not see."""
     measured: dict[str, float] = {}
-    """The final policy on plants that neither training nor those evaluations saw."""
+    """This policy, the best of the curve, on plants that neither training nor those evaluations saw."""
 
 
 @dataclass(frozen=True)

@@ -126,7 +126,7 @@ def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]
     dense, between = [*hidden[::2], policy.action_net], hidden[1::2]
     if any(type(layer).__name__ != "Linear" for layer in dense) or any(type(f).__name__ != "Tanh" for f in between):
         raise ValueError(f"policy has the layers {hidden}, they must be dense with tanh between them")
-    return [tuple(part.detach().numpy().astype(np.float64) for part in (d.weight, d.bias)) for d in dense]
+    return [(_array(layer.weight), _array(layer.bias)) for layer in dense]
 
 
 def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
@@ -138,4 +138,8 @@ def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
     if lstm.num_layers != 1:
         raise ValueError(f"lstm has {lstm.num_layers} layers, it must have 1")
     parts = (lstm.weight_ih_l0, lstm.weight_hh_l0, lstm.bias_ih_l0, lstm.bias_hh_l0)
-    return tuple(part.detach().numpy().astype(np.float64) for part in parts)
+    return tuple(_array(part) for part in parts)
+
+
+def _array(parameter: Any) -> NDArray[np.float64]:
+    return parameter.detach().numpy().astype(np.float64)  # type: ignore[no-any-return]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import math
 import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
@@ -37,6 +38,7 @@ Array = NDArray[np.float64]
 ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "recurrent": RecurrentPPO}
 VIEW = "smo_gym.learning.observations.agent_view"
 CHECKPOINTS = 20
+BEST = "best.safetensors"
 
 
 @dataclass(frozen=True)
@@ -69,7 +71,7 @@ class Run:
         for name, value in counts.items():
             if not isinstance(value, int) or value < 1:
                 raise ValueError(f"{name}={value!r} must be a whole number of at least 1")
-        _built(self)
+        built(self)
         make(self, 1, AutoresetMode.SAME_STEP).close()
         return self
 
@@ -143,7 +145,7 @@ def frozen(model: Any, run: Run) -> MlpPolicy:
 
 
 class Watch(BaseCallback):
-    """Every twentieth of a run: evaluate, keep a checkpoint, and begin afresh with seeds of that place.
+    """Every twentieth of a run: evaluate, keep the best policy and a checkpoint, begin afresh with seeds of that place.
 
     So what follows a checkpoint depends on the checkpoint alone: an interrupted run ends where an uninterrupted one
     does, on the same machine and number of threads.
@@ -164,9 +166,13 @@ class Watch(BaseCallback):
         self._fresh = False
 
     def keep(self) -> None:
-        """Evaluate and write a checkpoint."""
-        found = measure(frozen(self.model, self._run), VALIDATION)
-        self.model.curve = [*curve(self.model), {"steps": self.num_timesteps, **found}]  # type: ignore[attr-defined]
+        """Evaluate, write the policy if none was better before, and a checkpoint."""
+        policy = frozen(self.model, self._run)
+        found = measure(policy, VALIDATION)
+        before = curve(self.model)
+        if not before or cost(found) < min(cost(point) for point in before):
+            policy.save(self._checkpoint.with_name(BEST))
+        self.model.curve = [*before, {"steps": self.num_timesteps, **found}]  # type: ignore[attr-defined]
         for name, value in found.items():
             self.logger.record(f"validation/{name}", value)
         half = self._checkpoint.with_suffix(".half.zip")
@@ -178,6 +184,10 @@ class Watch(BaseCallback):
         seed = seeds(TRAINING, 1, self._run.seed, self.num_timesteps)[0]
         self.model.set_random_seed(seed)
         self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
+        # the first episodes end at random times: else all slots would go through their episodes in step, and every
+        # update would see one phase of them alone
+        left, task = (self.training_env.get_attr(name, 0)[0] for name in ("_steps_left", "task"))
+        left[:] = np.random.default_rng(seed).integers(1, task.steps, len(left), endpoint=True)
         self.model._last_episode_starts = np.ones(self._run.n_envs, dtype=np.bool_)
 
     def _on_step(self) -> bool:
@@ -187,6 +197,11 @@ class Watch(BaseCallback):
 def curve(model: Any) -> list[dict[str, float]]:
     """What the evaluations of a model during its training gave."""
     return list(getattr(model, "curve", []))
+
+
+def cost(found: dict[str, float]) -> tuple[float, float]:
+    """What a policy is chosen by: failures first, then MSE of h + MSE of theta."""
+    return found["failed"], found.get("mse_h", math.inf) + found.get("mse_theta", math.inf)
 
 
 def train(
@@ -204,7 +219,8 @@ def train(
         tensorboard: write what TensorBoard shows, too.
 
     Returns:
-        The final policy with its curve and measured result on its card.
+        Of the policies at the checkpoints the one that did best on validation plants, with the curve and its result on
+        test plants on its card.
 
     Raises:
         ValueError: the folder holds a run of other settings, or a checkpoint that cannot be read.
@@ -221,14 +237,14 @@ def train(
             raise ValueError(f"{checkpoint}: cannot be read ({error}): remove it to begin anew") from None
     else:
         model = algorithm(
-            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **_built(run)
+            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **built(run)
         )
     watch = Watch(run, checkpoint, progress)
     progress(model.num_timesteps, {})
     if model.num_timesteps < run.steps:
         model.learn(run.steps - model.num_timesteps, callback=watch, reset_num_timesteps=False, tb_log_name="run")
         watch.keep()
-    policy = frozen(model, run)
+    policy = MlpPolicy.load(folder / BEST)
     card = policy.card.model_copy(update={"curve": curve(model), "measured": measure(policy)})
     return replace(policy, card=card)
 
@@ -256,13 +272,13 @@ def agree(path: Path, settings: dict[str, Any]) -> None:
         raise ValueError(f"{path.parent} holds a run with another configuration: {'; '.join(differences)}")
 
 
-def _built(run: Run) -> dict[str, Any]:
+def built(run: Run) -> dict[str, Any]:
     """Hyperparameters with the zoo's schedules: lin_1e-3 falls from 1e-3 to 0."""
-    built = dict(run.hyperparameters)
-    for name, value in built.items():
+    found = dict(run.hyperparameters)
+    for name, value in found.items():
         if isinstance(value, str) and value.startswith("lin_"):
             try:
-                built[name] = LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
+                found[name] = LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
             except ValueError:
                 raise ValueError(f"{name}={value!r} must be a number, or lin_ and a number") from None
-    return built
+    return found
