@@ -108,6 +108,13 @@ def test_an_agent_acts_at_its_own_control_period(here):
     assert slow != runs("--controller", "lqr")["lqr"]
 
 
+def test_the_shipped_policy_is_the_one_in_its_file(here):
+    path = str(ROOT / "smo_gym" / "learning" / "baselines" / "pendulum.safetensors")
+    found = runs("--controller", "ppo", path, "--observer", "theorem")
+    assert found["ppo"] == found[path]
+    assert "Table 4, PPO" in (here / "out" / "tables.md").read_text()
+
+
 @pytest.mark.parametrize("options", [{}, {"control_period": 0.01}])
 def test_a_policy_acts_at_the_control_period_of_its_card(here, options):
     linear("a.safetensors", "positions", **options)
