@@ -42,8 +42,8 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         default=["all"],
         metavar="NAME",
         help="lqr, smc, a controller of the scenario's by name, or all of these (default); ppo for the policy that "
-        "comes with the package; PATH.safetensors for a trained one; PATH.zip for a model of Stable-Baselines3 (which "
-        "runs code in it); module:Class for an agent of your own",
+        "comes with the package; PATH.safetensors for a trained one; PATH.zip for a model of Stable-Baselines3 "
+        "(loading one can run code); module:Class for an agent of your own",
     )
     add(
         "--scenario",
