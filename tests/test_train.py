@@ -132,10 +132,6 @@ def test_bad_arguments(arguments, message, tmp_path, capsys):
         ({"env_kwargs": {"horizn": 1.0}}, "did you mean 'horizon'"),
         ({"n_steps": "many"}, "n_steps='many' must be"),
         ({"learning_rate": "lin_fast"}, "learning_rate='lin_fast' must be"),
-        (
-            {"policy": "smo_gym.learning.actor.NonePolicy"},
-            "policy='smo_gym.learning.actor.NonePolicy' cannot be imported",
-        ),
     ],
 )
 def test_bad_settings(change, message, tmp_path, capsys):
