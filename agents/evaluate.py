@@ -9,6 +9,7 @@ Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and th
 from __future__ import annotations
 
 import argparse
+import os
 import platform
 import sys
 import time
@@ -19,9 +20,9 @@ from pathlib import Path
 import yaml
 from tqdm import tqdm
 
-from smo_gym.evaluation import figures, files, scenario, study, tables
+from smo_gym.evaluation import agents, figures, files, scenario, study, tables
 from smo_gym.evaluation.statistics import results
-from smo_gym.validation import unknown
+from smo_gym.validation import number, unknown
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
@@ -35,7 +36,15 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
     )
     add = parser.add_argument
-    add("--controller", default="all", help="lqr, smc, a controller of the scenario's by name, or all (default)")
+    add(
+        "--controller",
+        nargs="+",
+        default=["all"],
+        metavar="NAME",
+        help="lqr, smc, a controller of the scenario's by name, or all of these (default); ppo for the policy that "
+        "comes with the package; PATH.safetensors for a trained one; PATH.zip for a model of Stable-Baselines3 "
+        "(loading one can run code); module:Class for an agent of your own",
+    )
     add(
         "--scenario",
         type=one_of("scenario", (*SCENARIOS, "all")),
@@ -62,6 +71,12 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--compensation",
         type=one_of("compensation", tuple(COMPENSATION)),
         help="of the observer smo: on, off or both (default)",
+    )
+    add(
+        "--force-limit",
+        type=force,
+        metavar="N",
+        help="limit in newtons in place of the scenario's, for all controllers",
     )
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
@@ -103,8 +118,16 @@ def fraction(text: str) -> float:
     return value
 
 
+def force(text: str) -> float:
+    """An argument type: a positive number of newtons."""
+    try:
+        return number("--force-limit", float(text), above=0.0)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} must be a positive number of newtons") from None
+
+
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
-    """The chosen scenarios, with the levels of the command line."""
+    """The chosen scenarios, with the levels and the force limit of the command line."""
     if arguments.config and arguments.scenario:
         raise ValueError(f"--scenario {' '.join(arguments.scenario)} and --config {arguments.config}: give one of them")
     names = SCENARIOS if "all" in (arguments.scenario or ["all"]) else dict.fromkeys(arguments.scenario)
@@ -114,20 +137,34 @@ def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
         wanted = tuple(dict.fromkeys(arguments.uncertainty))
         levels = scenario.Setting[tuple[float, ...]](value=wanted, source="chosen", note="command line")
         found = [one.model_copy(update={"uncertainty": levels}) for one in found]
+    if arguments.force_limit is not None:
+        newtons = scenario.Setting[float | None](value=arguments.force_limit, source="chosen", note="command line")
+        found = [one.model_copy(update={"force_limit": newtons}) for one in found]
     return found
 
 
-def chosen(scenarios: Sequence[scenario.Scenario], controller: str) -> list[str]:
-    """Names of the controllers that a name or a law stands for.
+def chosen(
+    scenarios: Sequence[scenario.Scenario], wanted: Sequence[str]
+) -> tuple[list[scenario.Scenario], list[str], list[str]]:
+    """The scenarios with the agents that are wanted of them, the names of all controllers, and who is left out where.
 
     Raises:
-        ValueError: no scenario has such a controller.
+        ValueError: no scenario has such a controller, or none takes such an agent.
+        ImportError: an extra is missing.
     """
     laws = {name: settings.law for one in scenarios for name, settings in one.controllers.items()}
-    found = [name for name, law in laws.items() if controller in (name, law, "all")]
-    if not found:
-        raise ValueError(unknown("controller", controller, {*laws, *laws.values(), "all"}))
-    return found
+    found: list[str] = []
+    left_out: list[str] = []
+    for text in dict.fromkeys(wanted):
+        known = [name for name, law in laws.items() if text in (name, law, "all")]
+        if not known and not agents.named(text):
+            names = unknown("controller", text, {*laws, *laws.values(), agents.SHIPPED, "all"})
+            raise ValueError(f"{names}, PATH.safetensors, PATH.zip and module:Class")
+        if not known:
+            scenarios, reasons = agents.entered(scenarios, text)
+            left_out += reasons
+        found += known or [text]
+    return list(scenarios), list(dict.fromkeys(found)), left_out
 
 
 def chosen_arms(observer: str, compensation: str | None) -> list[str]:
@@ -148,9 +185,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     args = parse(arguments)
     began = time.perf_counter()
+    sys.path.append(os.getcwd())  # where an agent of one's own usually is
     try:
-        scenarios = load(args)
-        controllers = chosen(scenarios, args.controller)
+        scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
         arms = chosen_arms(args.observer, args.compensation)
         groups = study.groups(scenarios, controllers, arms, args.runs)
         drawn, left_out = figures.planned(groups) if args.figures else ([], [])
@@ -160,6 +197,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"evaluate.py: error: {error}", file=sys.stderr)
         return 2
     runs = sum(group.runs for group in groups)
+    for line in left_out_agents:
+        print(line, file=sys.stderr)
     try:
         print(f"{runs} runs to do", file=sys.stderr, flush=True)
         with tqdm(
@@ -174,6 +213,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("evaluate.py: interrupted, nothing was written", file=sys.stderr)
         return 130
+    except ValueError as error:  # an agent's force that is not finite
+        print(f"evaluate.py: error: {error}; nothing was written", file=sys.stderr)
+        return 2
     numbers = results(outcomes)
     print(tables.render(numbers, "simple", rms=False))
     print(tables.diagnostics(outcomes, "simple"))

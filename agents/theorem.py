@@ -70,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tqdm(total=round(settings.horizon.value / DT), desc="samples", leave=False, disable=None) as bar:
         found = converge(
             {"designed": observer, "printed": lqr.observer.build(compensation=True)},
-            lqr.build(DT),
+            article.agent("lqr"),
             over,
             starts,
             plants,
@@ -148,12 +148,12 @@ def runs(found: Convergence, settings: TheoremSettings) -> None:
 
 def along(article: Scenario, controller: str) -> Traces:
     """Runs of Table 5's cases on the nominal plant, with compensation."""
-    settings, cases = article.controllers[controller], article.initial_states.value
+    observer, cases = article.controllers[controller].observer, article.initial_states.value
     env = gymnasium.make_vec("SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.options)
-    observed = VectorObserverWrapper(env, settings.observer.build(compensation=True))
+    observed = VectorObserverWrapper(env, observer.build(compensation=True))
     plants = np.repeat(CartPendulum().as_array()[None], len(cases), axis=0)
     options = {"state": np.array(list(cases.values())), "params": plants}
-    result = rollout(observed, settings.build(DT), options=options, trace_every=1)
+    result = rollout(observed, article.agent(controller), options=options, trace_every=1)
     assert result.traces is not None
     return result.traces
 
@@ -174,7 +174,7 @@ def trajectories(article: Scenario, traces: dict[str, Traces]) -> None:
 
 def switching(article: Scenario, traces: Traces) -> None:
     """(51) and (52) along SMC runs of Table 5's cases on the nominal plant."""
-    law = article.controllers["smc"].build(DT)
+    law = article.agent("smc")
     assert isinstance(law, SlidingModeController)
     rows = []
     for i, case in enumerate(article.initial_states.value):

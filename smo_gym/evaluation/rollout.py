@@ -16,7 +16,7 @@ from . import metrics
 
 Array = NDArray[np.float64]
 # An observer of poor gains can diverge while its plant goes on. No estimate in m, rad, m/s, rad/s comes near this.
-_DIVERGED = 1e4
+DIVERGED = 1e4
 
 
 class Agent(Protocol):
@@ -120,7 +120,7 @@ def rollout(
             action = np.where(failed[:, None], 0.0, action)
         observation, _, ended, _, info = env.step(action)
         metrics.add(sums, info, estimate(), failed)
-        failed = failed | ended.astype(np.bool_, copy=False) | ~(np.abs(observation) < _DIVERGED).all(axis=1)
+        failed = failed | ended.astype(np.bool_, copy=False) | ~(np.abs(observation) < DIVERGED).all(axis=1)
         trace.record(k, info, estimate())
         if k % 100 == 0:
             progress(100)

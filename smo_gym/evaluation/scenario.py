@@ -8,16 +8,20 @@ from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 import gymnasium
+import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..controllers import LQR, SlidingModeController
+from ..envs.task import Task, applied_force
 from ..observers import Gains, SlidingModeObserver
 from ..plant import CartPendulum
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
 from ..theorem import OperatingSet, design, stable
 from ..validation import unknown
 from ..wrappers import VectorObserverWrapper
+from . import agents
+from .rollout import Agent
 
 T = TypeVar("T")
 Four = tuple[float, float, float, float]
@@ -87,7 +91,19 @@ class SmcSettings(_Strict):
         )
 
 
-ControllerSettings = Annotated[LqrSettings | SmcSettings, Field(discriminator="law")]
+class PolicySettings(_Strict):
+    """An agent by its name for :func:`smo_gym.evaluation.agents.load`."""
+
+    law: Literal["policy"]
+    agent: str
+    observer: ObserverSettings
+
+    def build(self, environment: str) -> Agent:
+        """The agent for an environment, made anew."""
+        return agents.load(self.agent, environment)
+
+
+ControllerSettings = Annotated[LqrSettings | SmcSettings | PolicySettings, Field(discriminator="law")]
 
 
 class OperatingSetSettings(_Strict):
@@ -191,6 +207,34 @@ class Scenario(_Strict):
             "track_limit": self.track_limit.value,
         }
 
+    def agent(self, controller: str) -> Agent:
+        """A controller, made anew."""
+        settings = self.controllers[controller]
+        if isinstance(settings, PolicySettings):
+            return settings.build(self.environment)
+        return settings.build(self.control_period.value)
+
+    def period(self, agent: Agent) -> float:
+        """An agent's control period in s: its attribute ``control_period`` where it has one, else the scenario's."""
+        return float(getattr(agent, "control_period", self.control_period.value))
+
+    def with_agent(self, name: str) -> Scenario:
+        """The same with one controller more, on the estimates of LQR's observer (or the first controller's).
+
+        Args:
+            name: for :func:`smo_gym.evaluation.agents.load`.
+
+        Raises:
+            ValueError: there is no such agent, or it cannot act here.
+            ImportError: an extra is missing.
+        """
+        others = list(self.controllers.values())
+        like = next((one for one in others if one.law == "lqr"), others[0])
+        settings = PolicySettings(law="policy", agent=name, observer=like.observer)
+        more = self.model_copy(update={"controllers": {**self.controllers, name: settings}})
+        _try_controller(more, name)
+        return more
+
 
 def load_theorem(path: Path) -> TheoremSettings:
     """Read and validate the settings of ``agents/theorem.py``.
@@ -234,13 +278,26 @@ def _try(scenario: Scenario) -> None:
     """Make everything once, so that a value that is not allowed is noticed before any run."""
     if scenario.reference is not None and len(scenario.initial_states.value) != 1:
         raise ValueError("initial_states must hold one state: a reference begins at one")
-    env = gymnasium.make_vec(scenario.environment, 1, **scenario.options)
-    for settings in scenario.controllers.values():
-        settings.build(scenario.control_period.value)
-        VectorObserverWrapper(env, settings.observer.build(True))
+    for name in scenario.controllers:
+        _try_controller(scenario, name)
     if scenario.designed is not None:
-        model: CartPendulum = env.unwrapped.task.params  # type: ignore[attr-defined]
-        VectorObserverWrapper(env, scenario.designed.build(scenario.control_period.value, model))
+        env = gymnasium.make_vec(scenario.environment, 1, **scenario.options)
+        task: Task = env.unwrapped.task  # type: ignore[attr-defined]
+        VectorObserverWrapper(env, scenario.designed.build(task.dt, task.params))
+
+
+def _try_controller(scenario: Scenario, name: str) -> None:
+    """Two slots' first forces from a controller."""
+    agent = scenario.agent(name)
+    options = {**scenario.options, "control_period": scenario.period(agent)}
+    env = gymnasium.make_vec(scenario.environment, 2, **options)
+    observation, _ = VectorObserverWrapper(env, scenario.controllers[name].observer.build(True)).reset(seed=0)
+    try:
+        action, _ = agent.predict(observation, None, np.ones(2, dtype=np.bool_), True)
+        applied_force(action, 2, math.inf)
+    except Exception as error:  # whatever a user's agent may raise
+        place = f"{scenario.environment} on observations of shape {observation.shape}"
+        raise ValueError(f"{name}: cannot act in {place} ({type(error).__name__}: {error})") from error
 
 
 def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:

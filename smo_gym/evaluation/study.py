@@ -157,19 +157,20 @@ def _run(
     samples: int | None,
 ) -> list[Outcome]:
     scenario, settings = batch[0].scenario, batch[0].settings
+    agent = scenario.agent(batch[0].controller)
+    dt = scenario.period(agent)
     n = sum(group.runs for group in batch)
     env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
-        scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **options
+        scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **{**options, "control_period": dt}
     )
     task: Task = env.unwrapped.task  # type: ignore[attr-defined]
     nominal = task.params
     draws = deviations(seed, max(group.runs for group in batch))
-    dt = scenario.control_period.value
     states, plants, observers = [], [], []
     for group in batch:
         if group.arm == "theorem":
             assert scenario.designed is not None  # groups() has seen to it
-            observer = scenario.designed.build(dt, nominal)
+            observer = scenario.designed.build(task.dt, nominal)
         else:
             observer = settings.observer.build(group.arm == "with")
         for draw in draws[: group.runs]:
@@ -181,7 +182,7 @@ def _run(
     slots = [part[:TRACED_RUNS] for part in np.split(np.arange(n), edges)]
     result = rollout(
         observed,
-        settings.build(dt),
+        agent,
         options={"state": np.array(states), "params": np.array(plants)},
         trace_every=None if samples is None else max(task.steps // samples, 1),
         trace_slots=np.concatenate(slots).tolist(),

@@ -9,9 +9,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, fields
 
 import numpy as np
-from tabulate import tabulate
+from tabulate import LATEX_ESCAPE_RULES, tabulate
 
 from ..article import Cell
+from . import agents
 from .metrics import NAMES
 from .statistics import Result
 from .study import ARMS, Outcome
@@ -38,7 +39,7 @@ def render(results: Sequence[Result], form: str, *, rms: bool) -> str:
     """
     parts = []
     for (table, controller), rows in _by_table(results).items():
-        parts.append(_heading(f"Table {table}, {controller.upper()}", form))
+        parts.append(_heading(f"Table {table}, {title(controller)}", form))
         shown = [row for row in rows if row.cell.metric == "mse" or (rms and row.cell.metric == "rms")]
         parts.append(_table(form, _HEADER, [_cell_row(row) for row in shown]))
         reductions = [row for row in rows if row.cell.metric == _REDUCTION]
@@ -66,6 +67,11 @@ def verdict(rows: Sequence[Result]) -> str:
         + (f"Averages off {', '.join(f'{100 * np.expm1(a):+.1f} %' for a in averages)}. " if averages else "")
         + failed
     )
+
+
+def title(controller: str) -> str:
+    """A controller's name in capitals, a path or class as it is."""
+    return controller.upper() if controller == agents.SHIPPED or not agents.named(controller) else controller
 
 
 def summary(results: Sequence[Result]) -> str:
@@ -101,7 +107,7 @@ def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
                 means = [f"{values.mean():.3g}" if values.size else "" for values in columns]
                 left = [o.left for o in chosen if o.left is not None]
                 count = f"{np.concatenate(left).sum()} of {sum(map(len, left))}" if left else ""
-                rows.append((table, controller.upper(), arm, *means, count))
+                rows.append((table, title(controller), arm, *means, count))
     return _table(form, header, rows)
 
 
@@ -122,7 +128,7 @@ def results_csv(results: Sequence[Result]) -> str:
     """One line a result: the columns of the published data, then what stands beside it."""
     numbers = ("published", "measured", "ci_low", "ci_high", "runs", "failures", "median")
     header = [*(field.name for field in fields(Cell)), *numbers]
-    return _csv(header, ([*asdict(r.cell).values(), *(_exact(getattr(r, name)) for name in numbers)] for r in results))
+    return as_csv(header, ([*asdict(r.cell).values(), *(exact(getattr(r, name)) for name in numbers)] for r in results))
 
 
 def runs_csv(outcomes: Sequence[Outcome]) -> str:
@@ -134,12 +140,13 @@ def runs_csv(outcomes: Sequence[Outcome]) -> str:
             group = outcome.group
             place = [group.scenario.table, group.name, group.uncertainty, group.case, group.arm]
             for run, failed in enumerate(outcome.failed):
-                yield [*place, run, int(failed), *(_exact(outcome.metrics[name][run]) for name in NAMES)]
+                yield [*place, run, int(failed), *(exact(outcome.metrics[name][run]) for name in NAMES)]
 
-    return _csv(header, lines())
+    return as_csv(header, lines())
 
 
-def _csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
+def as_csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
+    """A header and lines as CSV."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(header)
@@ -147,7 +154,7 @@ def _csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
     return file.getvalue()
 
 
-def _exact(value: float) -> object:
+def exact(value: float) -> object:
     """The shortest text that reads back as the same number; empty for none."""
     if isinstance(value, int):
         return value
@@ -197,7 +204,7 @@ def _heading(text: str, form: str, level: int = 2) -> str:
     if form == "github":
         return f"{'#' * level} {text}"
     if form.startswith("latex"):
-        return f"\\{'sub' * (level - 2)}section*{{{text}}}"
+        return f"\\{'sub' * (level - 2)}section*{{{''.join(LATEX_ESCAPE_RULES.get(c, c) for c in text)}}}"
     return text if level > 2 else f"{text}\n{'=' * len(text)}"
 
 

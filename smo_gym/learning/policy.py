@@ -16,8 +16,9 @@ from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
 from scipy.special import expit
 
+from ..envs.task import HANGING
 from ..evaluation import files
-from ..validation import choice
+from ..validation import choice, number
 from .observations import KINDS, scaled
 
 Array = NDArray[np.float64]
@@ -83,6 +84,12 @@ class MlpPolicy:
         if not all(np.isfinite(W).all() and np.isfinite(b).all() for W, b in self.layers):
             raise ValueError("weights must be finite")
 
+    @property
+    def control_period(self) -> float:
+        """In s: that of its training."""
+        options = self.card.configuration.get("options", {})
+        return number("control_period", options.get("control_period", HANGING.control_period), above=0.0)
+
     def predict(
         self,
         observation: Array,
@@ -112,11 +119,7 @@ class MlpPolicy:
         """Inputs of the first layer from the newest frame (n, entries) and what came before."""
         if self.card.frames == 1:
             return frame, state
-        repeated = np.repeat(frame[:, None], self.card.frames, axis=1)
-        frames = repeated
-        if state is not None:
-            frames = np.concatenate([state[0][:, 1:], frame[:, None]], axis=1)
-            frames = np.where(_starts(episode_start)[:, None, None], repeated, frames)
+        frames = stacked(frame, self.card.frames, None if state is None else state[0], episode_start)
         return frames.reshape(len(frame), -1), (frames,)
 
     def _seen(self, observation: Array) -> Array:
@@ -173,6 +176,18 @@ class MlpPolicy:
             return LstmPolicy(card, layers, tuple(tensors[k] for k in LSTM)) if card.lstm else MlpPolicy(card, layers)
         except ValueError as error:
             raise ValueError(f"{path}: {error}") from None
+
+
+def stacked(frame: Array, count: int, past: Array | None, episode_start: NDArray[np.bool_] | None) -> Array:
+    """The last frames, the newest last, (n, count, entries), from the newest (n, entries) and those before.
+
+    Where an episode starts, and everywhere without a past, the first is repeated.
+    """
+    repeated = np.repeat(frame[:, None], count, axis=1)
+    if past is None:
+        return repeated
+    frames = np.concatenate([past[:, 1:], frame[:, None]], axis=1)
+    return np.where(_starts(episode_start)[:, None, None], repeated, frames)
 
 
 LSTM = ("lstm.weight_ih", "lstm.weight_hh", "lstm.bias_ih", "lstm.bias_hh")

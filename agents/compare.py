@@ -1,0 +1,118 @@
+"""The RL table: learned policies, LQR and SMC, each on what it is allowed to know, on the same plants.
+
+    python agents/compare.py runs
+
+DIR holds what agents/train.py writes, several seeds a kind. All start from Table 4's initial state under one force
+limit; the score of a run is MSE of h plus MSE of theta, and a run that failed has the worst. Writes learning.md,
+learning.csv and runs.csv to --out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from smo_gym.evaluation import files, scenario, study
+from smo_gym.learning import comparison
+
+CONFIG = Path(__file__).resolve().parent.parent / "configs" / "regulation.yaml"
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add(
+        "folders",
+        type=Path,
+        nargs="*",
+        default=[Path("runs")],
+        metavar="DIR",
+        help="of trained policies (default: runs)",
+    )
+    add("--runs", type=int, default=50, metavar="N", help="random plants a level (default 50)")
+    add("--seed", type=int, default=0, help="of the random plants (default 0)")
+    add("--force-limit", type=float, default=30.0, metavar="N", help="in newtons, for all (default 30, as in training)")
+    add(
+        "--config",
+        type=Path,
+        default=CONFIG,
+        metavar="FILE",
+        help="scenario (default: configs/regulation.yaml, Table 4)",
+    )
+    add("--out", type=Path, default=Path("results/learning"), metavar="DIR", help="folder (default: results/learning)")
+    return parser.parse_args(arguments)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compare; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
+    args = parse(arguments)
+    try:
+        from smo_gym.learning import aggregates, table
+
+        if args.runs < 1 or args.seed < 0 or not 0.0 < args.force_limit < math.inf:
+            raise ValueError(
+                f"--runs {args.runs} must be at least 1, --seed {args.seed} at least 0 and --force-limit "
+                f"{args.force_limit:g} a positive number of newtons"
+            )
+        limit = scenario.Setting[float | None](value=args.force_limit, source="chosen", note="command line")
+        place = scenario.load(args.config).model_copy(update={"force_limit": limit})
+        contenders, left_out = comparison.trained(args.folders, place.environment)
+        contenders += comparison.designed(place)
+        place = comparison.entered(place, contenders)
+        out = files.prepare(args.out)
+    except (ValueError, ImportError) as error:
+        print(f"compare.py: error: {error}", file=sys.stderr)
+        return 2
+    for line in left_out:
+        print(line, file=sys.stderr)
+    groups = [group for contender in contenders for group in comparison.groups(place, contender, args.runs)]
+    try:
+        with tqdm(
+            total=study.simulated_seconds(groups),
+            unit="s",
+            unit_scale=True,
+            desc="simulated",
+            leave=False,
+            disable=None,
+        ) as bar:
+            scores = comparison.measure(place, contenders, args.runs, args.seed, bar.update)
+        rows, answers = [], []
+        asked = table.questions(scores)
+        count = len(scores) + sum(len(pairs) for _, pairs in asked)
+        with tqdm(total=count, unit="interval", leave=False, disable=None) as bar:
+            for one in scores:
+                rows.append(table.Row(one, aggregates.interquartile_means(one)))
+                bar.update()
+            for question, pairs in asked:
+                answers += [f"\n{question}\n", *([] if pairs else ["- open: there are no such runs"])]
+                for a, b in pairs:
+                    answers.append(f"- {table.sentence(aggregates.compare(a, b))}")
+                    bar.update()
+    except KeyboardInterrupt:
+        print("compare.py: interrupted, nothing was written", file=sys.stderr)
+        return 130
+    words, levels = "\n".join(answers), place.uncertainty.value
+    print(table.render(rows, levels, "simple"))
+    print(f"{words}\n\nresults are in {out}")
+    told = (
+        "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
+        f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. LQR "
+        f"and SMC act every {place.control_period.value:g} s, policies as in their training. A failed run counts as "
+        "the worst.\n"
+    )
+    files.write(out / "learning.md", f"{told}\n{table.render(rows, levels, 'github')}\n{words}\n")
+    files.write(out / "learning.csv", table.aggregate_csv(rows, levels))
+    files.write(out / "runs.csv", table.runs_csv(rows, levels))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,92 @@
+"""Agents by name: the shipped policy, trained weights, a model of Stable-Baselines3, a class of your own."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+from ..learning import BASELINES, shipped
+from ..learning.policy import MlpPolicy
+from ..validation import unknown
+from .rollout import Agent
+
+if TYPE_CHECKING:
+    from .scenario import Scenario
+
+SHIPPED = "ppo"
+
+
+def named(text: str) -> bool:
+    """Whether a text has the form of an agent's name for :func:`load`."""
+    return text == SHIPPED or text.endswith((".safetensors", ".zip")) or ":" in text
+
+
+def load(name: str, environment: str) -> Agent:
+    """An agent for an environment.
+
+    Args:
+        name: ``ppo``, the policy that comes with the package; ``PATH.safetensors``, weights with their card
+            ``PATH.json``; ``PATH.zip``, a model that Stable-Baselines3 saved, which unpickles (only open files of those
+            you trust); ``module:Class``, called without arguments.
+        environment: id of the environment that it is to act in.
+
+    Raises:
+        ValueError: there is no such agent, its files are damaged, or it was trained for another environment.
+        ImportError: an SB3 model, and the extra ``rl`` is missing.
+    """
+    if name == SHIPPED:
+        if environment not in BASELINES:
+            raise ValueError(f"no policy is shipped for {environment}, only for {' and '.join(BASELINES)}")
+        return shipped(environment)
+    if name.endswith(".safetensors"):
+        policy = MlpPolicy.load(name)
+        if policy.card.environment != environment:
+            raise ValueError(f"{name}: was trained for {policy.card.environment}, not for {environment}")
+        return policy
+    if name.endswith(".zip"):
+        from ..learning import zipped
+
+        return zipped.load(name)
+    return _own(name)
+
+
+def entered(scenarios: Sequence[Scenario], agent: str) -> tuple[list[Scenario], list[str]]:
+    """The scenarios with an agent where it can act, and a line for each other.
+
+    Raises:
+        ValueError: it can act in none.
+        ImportError: an extra is missing.
+    """
+    reasons: dict[str, str] = {}
+
+    def enter(one: Scenario) -> Scenario:
+        try:
+            return one.with_agent(agent)
+        except ValueError as error:
+            reasons[one.title] = str(error)
+            return one
+
+    more = [enter(one) for one in scenarios]
+    if len(reasons) == len(scenarios):
+        raise ValueError("; ".join(dict.fromkeys(reasons.values())))
+    return more, [f"left out of {title}: {reason}" for title, reason in reasons.items()]
+
+
+def _own(name: str) -> Agent:
+    module_name, _, attribute = name.partition(":")
+    try:
+        module = importlib.import_module(module_name)
+    except Exception as error:  # whatever a user's module may raise
+        raise ValueError(f"{name}: cannot import {module_name!r} ({type(error).__name__}: {error})") from error
+    made = getattr(module, attribute, None)
+    if not callable(made):
+        known = [word for word, value in vars(module).items() if isinstance(value, type) and not word.startswith("_")]
+        raise ValueError(unknown(f"class in {module_name}", attribute, known))
+    try:
+        agent = made()
+    except Exception as error:
+        raise ValueError(f"{name}: cannot be made without arguments ({type(error).__name__}: {error})") from error
+    if not callable(getattr(agent, "predict", None)):
+        raise ValueError(f"{name}: has no method predict(observation, state, episode_start, deterministic)")
+    return cast(Agent, agent)

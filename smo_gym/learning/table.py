@@ -1,0 +1,134 @@
+"""The RL table: controllers x kinds of observation, in full, and the answer in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from tabulate import tabulate
+
+from ..evaluation.tables import as_csv, exact
+from .aggregates import Comparison, Estimate
+from .comparison import Scores
+from .observations import KINDS
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A contender's interquartile means."""
+
+    scores: Scores
+    means: Sequence[Estimate]
+    """At each level, and last over all."""
+
+
+def render(rows: Sequence[Row], levels: Sequence[float], form: str) -> str:
+    """Both tables: over all levels as a matrix, and level by level with what failed.
+
+    Args:
+        rows: the contenders.
+        levels: of uncertainty, as fractions.
+        form: a format of tabulate.
+    """
+    kinds = [kind for kind in KINDS if any(row.scores.contender.observation == kind for row in rows)]
+    cells = {(row.scores.contender.controller, row.scores.contender.observation): _span(row.means[-1]) for row in rows}
+    controllers = dict.fromkeys(controller for controller, _ in cells)
+    matrix = [[controller, *(cells.get((controller, kind), "") for kind in kinds)] for controller in controllers]
+    header = [
+        "controller",
+        "observation",
+        "seeds",
+        "steps",
+        *(f"{100 * level:g} %" for level in levels),
+        "all",
+        "failed",
+    ]
+    detail = [
+        [
+            row.scores.contender.controller,
+            row.scores.contender.observation,
+            str(len(row.scores.contender.cards) or ""),
+            _steps(row),
+            *map(_span, row.means),
+            f"{row.scores.failed.sum()} of {row.scores.failed.size}",
+        ]
+        for row in rows
+    ]
+    tables = ((["all levels", *kinds], matrix), (header, detail))
+    return "\n\n".join(tabulate(lines, top, tablefmt=form, disable_numparse=True) for top, lines in tables)
+
+
+def _steps(row: Row) -> str:
+    """What each policy learned from, control periods."""
+    steps = [card.configuration.get("steps") for card in row.scores.contender.cards]
+    return f"{steps[0]:,}" if steps and isinstance(steps[0], int) else ""
+
+
+def _span(one: Estimate) -> str:
+    return f"{one.value:.4g}" + ("" if math.isnan(one.low) else f" [{one.low:.4g}, {one.high:.4g}]")
+
+
+def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores, Scores]]]]:
+    """What is asked of the contenders that there are, and who answers it against whom."""
+    learned = [scores for scores in all_scores if scores.contender.cards]
+    known = {scores.contender.title: scores for scores in all_scores}
+    on_estimates = [scores for scores in learned if scores.contender.observation == "smo"]
+    on_positions = [scores for scores in learned if scores.contender.observation in ("positions", "stacked")]
+    laws = [known[title] for title in ("LQR on smo", "SMC on smo") if title in known]
+    return [
+        (
+            "Does a policy that learns on SMO estimates beat one that learns on positions?",
+            [(a, b) for a in on_estimates for b in on_positions],
+        ),
+        (
+            "Does either beat LQR and SMC on SMO estimates?",
+            [(a, b) for a in on_estimates + on_positions for b in laws],
+        ),
+    ]
+
+
+def sentence(comparison: Comparison) -> str:
+    """A comparison in words."""
+    a, b, ratio, probability = comparison.a, comparison.b, comparison.ratio, comparison.probability
+
+    def span(low: float, high: float) -> str:
+        return "" if math.isnan(low) else f" [{low:.3g}, {high:.3g}]"
+
+    return (
+        f"{a.contender.title} against {b.contender.title}: {comparison.verdict}. Its interquartile mean is "
+        f"{ratio.value:.3g}{span(ratio.low, ratio.high)} times the other's, and it has the lower score on the same "
+        f"plant with probability {probability.value:.3g}{span(probability.low, probability.high)}."
+    )
+
+
+def aggregate_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
+    """One line a contender and level."""
+    header = ["controller", "observation", "seeds", "uncertainty", "iqm", "ci_low", "ci_high", "runs", "failures"]
+
+    def lines() -> Iterable[list[object]]:
+        for row in rows:
+            contender, failed = row.scores.contender, row.scores.failed
+            counts = [*(failed[:, k] for k in range(len(levels))), failed]
+            for level, mean, runs in zip([*levels, "all"], row.means, counts, strict=True):
+                place = [contender.controller, contender.observation, len(contender.cards), level]
+                yield [*place, *map(exact, (mean.value, mean.low, mean.high)), runs.size, int(runs.sum())]
+
+    return as_csv(header, lines())
+
+
+def runs_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
+    """One line a run."""
+    header = ["controller", "observation", "seed", "uncertainty", "run", "failed", "score"]
+
+    def lines() -> Iterable[list[object]]:
+        for row in rows:
+            contender = row.scores.contender
+            seeds: list[object] = [card.seed for card in contender.cards] or [""]
+            for (i, k, run), score in np.ndenumerate(row.scores.values):
+                failed = int(row.scores.failed[i, k, run])
+                place = [contender.controller, contender.observation, seeds[i], levels[k], run]
+                yield [*place, failed, "" if failed else exact(float(score))]
+
+    return as_csv(header, lines())
