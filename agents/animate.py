@@ -70,7 +70,7 @@ def record(one: scenario.Scenario, controller: str, case: str, seconds: float, s
     settings, dt = one.controllers[controller], one.control_period.value
     env = gymnasium.make(one.environment, render_mode="rgb_array", control_period=dt)
     env = smo_gym.ObserverWrapper(env, settings.observer.build(True))
-    agent = settings.build(dt)
+    agent = one.agent(controller)
     observation, _ = env.reset(seed=seed, options={"state": one.initial_states.value[case]})
     frames: list[Any] = [env.render()]
     state, over = None, False

@@ -230,7 +230,7 @@ def test_a_missing_extra_is_named(here, monkeypatch, capsys):
 
 
 def test_the_pages_agent_runs_as_it_stands(here, monkeypatch, capsys):
-    agent, in_python = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    agent, in_python = re.findall(r"```python(?: title=.+?)?\n(.*?)```", PAGE, re.DOTALL)
     (here / "my_agent.py").write_text(agent)
     monkeypatch.delitem(sys.modules, "my_agent", raising=False)
     (command,) = re.findall(r"python agents/evaluate.py (--controller .*?) --scenario", PAGE)
@@ -242,6 +242,6 @@ def test_the_pages_agent_runs_as_it_stands(here, monkeypatch, capsys):
     mse, failed = capsys.readouterr().out.split()
     assert 0.0 < float(mse) < 1.0
     assert failed == "0"
-    (settings,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+    (settings,) = re.findall(r"```yaml(?: title=.+?)?\n(.*?)```", PAGE, re.DOTALL)
     (here / "mine.yaml").write_text(settings.replace("configs/", f"{ROOT}/configs/"))
     assert isinstance(scenario.load(Path("mine.yaml")).agent("mine").law, LQR)
