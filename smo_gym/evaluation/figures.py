@@ -37,6 +37,8 @@ COLOURS = {
 TITLES = {"lqr": "LQR", "smc": "SMC", "smc-tracking": "SMC tracking"}
 SAMPLES = 500
 """Instants of a trace that look continuous at the size of these figures."""
+WINDOW = 0.25
+"""s; chattering is averaged over it."""
 FORMATS = ("pdf", "png")
 _POSITIONS = (("h", "m"), ("\\theta", "rad"))
 _STYLE: dict[Any, Any] = {
@@ -61,7 +63,6 @@ _STYLE: dict[Any, Any] = {
 }
 _WIDTH = 6.9  # in, a page's text
 _START = 3.0  # s, of the estimation errors
-_WINDOW = 0.25  # s; chattering is averaged over it
 _BAR_KINDS = ("published", "measured")
 
 
@@ -198,12 +199,11 @@ def _inputs(plan: Plan, outcomes: Sequence[Outcome]) -> Figure:
             some = np.isfinite(low).any(axis=1)
             span = (np.nanmin(low[some], axis=1), np.nanmax(high[some], axis=1))
             panel.fill_between(traces.time[some], *span, step="pre", color=_colour(outcome), alpha=0.2, linewidth=0.0)
-            window = max(round(_WINDOW / (traces.time[1] - traces.time[0])), 1)
-            _lines(panel, outcome, uniform_filter1d(traces.u_mean, window, axis=0, mode="nearest"), label=False)
+            _lines(panel, outcome, smooth(traces.time, traces.u_mean), label=False)
     for panel, arm in zip(axes[:, 0], arms, strict=True):
         panel.set_ylabel(f"$F$ (N)\n{ARMS[arm]}")
     for column in axes.T:
-        column[0].plot([], [], color="0.3", linewidth=0.8, label=f"mean over {_WINDOW:g} s")
+        column[0].plot([], [], color="0.3", linewidth=0.8, label=f"mean over {WINDOW:g} s")
         column[0].fill_between([], [], color="0.3", alpha=0.2, linewidth=0.0, label="range")
     return _finish(plan, figure, axes, columns)
 
@@ -256,6 +256,12 @@ def _columns(outcomes: Sequence[Outcome], by: Literal["name", "arm"]) -> dict[st
     titles = TITLES if by == "name" else ARMS
     found = {title: [o for o in outcomes if getattr(o.group, by) == key] for key, title in titles.items()}
     return {title: chosen for title, chosen in found.items() if chosen}
+
+
+def smooth(time: Array, force: Array) -> Array:
+    """Forces (m, runs) averaged over :data:`WINDOW`."""
+    window = max(round(WINDOW / (time[1] - time[0])), 1)
+    return np.asarray(uniform_filter1d(force, window, axis=0, mode="nearest"))
 
 
 def _traces(outcome: Outcome) -> Any:
