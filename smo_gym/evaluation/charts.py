@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 COLOURS = {"without": "#D55E00", "with": "#0072B2", "theorem": "#009E73", "oracle": "#B35C92"}
-"""Of the arms: Okabe and Ito's, told apart by the colour-blind, on light and dark ground."""
+"""Of the arms, after Okabe and Ito: told apart by the colour-blind."""
+COLOURS_ON_DARK = {"without": "#F08A3C", "with": "#56B4E9", "theorem": "#2CC295", "oracle": "#E39AC8"}
+"""The same on dark ground."""
 ARM_NAMES = {
     "without": "without compensation",
     "with": "with compensation",
@@ -63,7 +65,8 @@ def curves() -> Figure:
     figure.update_traces(hovertemplate="%{y:.4g} at %{x:.2f} s", selector={"hoverinfo": None})
     figure.update_xaxes(title_text="t (s)", row=5, col=1)
     cursor = {"type": "line", "xref": "x", "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1, "line": {"width": 1}}
-    return _quiet(figure, 900, shapes=[cursor], meta=AXES, legend={"x": 1.0, "xanchor": "right"})
+    legend = {"x": 1.0, "xanchor": "right", "y": 1.015}
+    return _quiet(figure, 900, shapes=[cursor], meta=AXES, legend=legend, margin_t=60)  # room for Plotly's buttons
 
 
 def scatter(results: Sequence[Result]) -> Figure | None:
@@ -142,7 +145,7 @@ def _bars(cells: Sequence[Result]) -> Figure:
                     Bar(y=values, error_y=span, name=f"{arm}, measured", marker={"color": COLOURS[arm]}, **look), row, 1
                 )
     figure.update_traces(hovertemplate="%{x}: %{y:.4g}")
-    figure.update_xaxes(type="category")
+    figure.update_xaxes(type="category", automargin=True)
     figure.update_yaxes(title_text="MSE of h (m²)", row=1, col=1)
     figure.update_yaxes(title_text="MSE of θ (rad²)", row=2, col=1)
     return _quiet(figure, 520, barmode="group", bargap=0.25)
@@ -169,7 +172,7 @@ def _quiet(figure: Figure, height: int, **layout: Any) -> Figure:
     figure.update_layout(
         template="none",
         height=height,
-        margin={"l": 64, "r": 8, "t": 8, "b": 44},
+        margin={"l": 64, "r": 16, "t": 8, "b": 44},
         legend={"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom"},
         hovermode="closest",
     )

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from .rollout import Traces
 from .statistics import Result
 from .study import Group, Outcome
 
@@ -163,7 +164,7 @@ def _states(plan: Plan, outcomes: Sequence[Outcome]) -> Figure:
     for column, chosen in zip(axes.T, columns.values(), strict=True):
         for j, panel in enumerate(column):
             for outcome in chosen:
-                traces = _traces(outcome)
+                traces = traced(outcome)
                 _lines(panel, outcome, traces.x[:, j], label=plan.table != "7")
             if traces.x_d is not None:
                 panel.plot(traces.time, traces.x_d[:, j], color="black", linewidth=1.2, label="reference")
@@ -180,7 +181,7 @@ def _errors(plan: Plan, outcomes: Sequence[Outcome]) -> Figure:
     for column, until in zip(axes.T, columns.values(), strict=True):
         for j, panel in enumerate(column):
             for outcome in outcomes:
-                traces = _traces(outcome)
+                traces = traced(outcome)
                 _lines(panel, outcome, traces.x[:, j] - traces.xhat[:, j], until, label=until == horizon)
     for panel, (state, unit) in zip(axes[:, 0], _POSITIONS, strict=True):
         panel.set_ylabel(f"${state} - \\hat{{{state}}}$ ({unit})")
@@ -194,7 +195,7 @@ def _inputs(plan: Plan, outcomes: Sequence[Outcome]) -> Figure:
     figure, axes = _panels(len(arms), len(columns), 1.8 * len(arms), sharex=True, sharey="col")
     for column, chosen in zip(axes.T, columns.values(), strict=True):
         for outcome in chosen:
-            traces, panel = _traces(outcome), column[arms.index(outcome.group.arm)]
+            traces, panel = traced(outcome), column[arms.index(outcome.group.arm)]
             low, high = (_alive(outcome, values) for values in (traces.u_low, traces.u_high))
             some = np.isfinite(low).any(axis=1)
             span = (np.nanmin(low[some], axis=1), np.nanmax(high[some], axis=1))
@@ -260,11 +261,18 @@ def _columns(outcomes: Sequence[Outcome], by: Literal["name", "arm"]) -> dict[st
 
 def smooth(time: Array, force: Array) -> Array:
     """Forces (m, runs) averaged over :data:`WINDOW`."""
+    if len(time) < 2:
+        return force
     window = max(round(WINDOW / (time[1] - time[0])), 1)
     return np.asarray(uniform_filter1d(force, window, axis=0, mode="nearest"))
 
 
-def _traces(outcome: Outcome) -> Any:
+def traced(outcome: Outcome) -> Traces:
+    """An outcome's traces.
+
+    Raises:
+        ValueError: it has none.
+    """
     if outcome.traces is None:
         raise ValueError(f"{outcome.group.name} has no traces: measure it with samples={SAMPLES}")
     return outcome.traces
@@ -272,14 +280,14 @@ def _traces(outcome: Outcome) -> Any:
 
 def _alive(outcome: Outcome, values: Array) -> Array:
     """Values (m, runs) without those after a run's failure."""
-    traces = _traces(outcome)
+    traces = traced(outcome)
     duration = outcome.metrics["duration"][: values.shape[1]]
     return np.where(traces.time[:, None] <= duration + 1e-9, values, np.nan)
 
 
 def _lines(panel: Axes, outcome: Outcome, values: Array, until: float = math.inf, label: bool = True) -> None:
     """One line a run of values (m, runs)."""
-    time = _traces(outcome).time
+    time = traced(outcome).time
     shown = time <= until
     lines = panel.plot(time[shown], _alive(outcome, values)[shown], color=_colour(outcome), linewidth=0.8, alpha=0.85)
     if label:
@@ -309,7 +317,7 @@ def _finish(plan: Plan, figure: Figure, axes: NDArray[Any], columns: Mapping[str
         panel.margins(x=0.0)
         panel.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
     outcomes = list({id(outcome): outcome for chosen in columns.values() for outcome in chosen}.values())
-    group, runs = outcomes[0].group, _traces(outcomes[0]).u.shape[1]
+    group, runs = outcomes[0].group, traced(outcomes[0]).u.shape[1]
     names = " and ".join(dict.fromkeys(TITLES[outcome.group.name] for outcome in outcomes))
     state = ", ".join(f"{value:g}" for value in group.scenario.initial_states.value[group.case]).replace("-", "−")
     text = f"{names} from $x(0)$ = [{state}], {runs} plants at {100 * group.uncertainty:g} % uncertainty"

@@ -10,13 +10,12 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..plant import STATE_NAMES
-from .figures import smooth
+from .figures import smooth, traced
 from .study import Outcome
 
 Array = NDArray[np.float64]
@@ -31,13 +30,12 @@ _LARGEST = 1e4  # an estimate that has diverged
 
 def runs_that_fit(outcomes: Sequence[Outcome]) -> int:
     """How many runs of each group keep a page small; at least one."""
-    most = max(_traces(o).u.shape[1] for o in outcomes)
-    sizes = [len(CHANNELS) * len(_traces(o).time) for o in outcomes]
-    counts = [_traces(o).u.shape[1] for o in outcomes]
+    shapes: list[tuple[int, int]] = [traced(outcome).u.shape for outcome in outcomes]  # instants, runs
 
     def total(runs: int) -> int:
-        return sum(size * min(count, runs) for size, count in zip(sizes, counts, strict=True))
+        return len(CHANNELS) * sum(instants * min(count, runs) for instants, count in shapes)
 
+    most = max(count for _, count in shapes)
     return next((runs for runs in range(most, 1, -1) if total(runs) <= MOST_VALUES), 1)
 
 
@@ -51,7 +49,7 @@ def pack(outcomes: Sequence[Outcome], runs: int) -> tuple[list[dict[str, int | N
     places: list[dict[str, int | None]] = []
     blocks: list[Array] = []
     for outcome in outcomes:
-        traces = _traces(outcome)
+        traces = traced(outcome)
         first = len(blocks)
         shown = min(runs, traces.u.shape[1])
         mean = smooth(traces.time, traces.u_mean)
@@ -78,9 +76,3 @@ def _code(block: Array) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     low, span = limits[:, :1].astype(np.float64), np.diff(limits.astype(np.float64), axis=1)
     whole = np.rint((block - low) / np.where(span > 0.0, span, 1.0) * LEVELS[:, None])
     return limits, np.diff(np.clip(whole, 0, LEVELS[:, None]).astype(np.int64), axis=1, prepend=0)
-
-
-def _traces(outcome: Outcome) -> Any:
-    if outcome.traces is None:
-        raise ValueError(f"{outcome.group.name} has no traces: measure it with samples")
-    return outcome.traces

@@ -87,7 +87,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         data={
             "channels": CHANNELS,
             "levels": LEVELS.tolist(),
-            "colours": charts.COLOURS,
+            "colours": {arm: [colour, charts.COLOURS_ON_DARK[arm]] for arm, colour in charts.COLOURS.items()},
             "arms": charts.ARM_NAMES,
             "groups": groups,
         },
@@ -135,7 +135,7 @@ def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
         "case": group.case,
         "start": [float(value) for value in group.scenario.initial_states.value[group.case]],
         "arm": group.arm,
-        "period": float(traces.time[1] - traces.time[0]),
+        "period": float(traces.time[1]) if len(traces.time) > 1 else 1.0,
         "failed": outcome.failed.tolist(),
         "duration": [round(float(value), 6) for value in outcome.metrics["duration"]],
         "plants": [[float(f"{value:.4g}") for value in plant] for plant in outcome.plants],
@@ -258,4 +258,4 @@ def _text(value: Any) -> str:
         return f"[{', '.join(map(_text, value))}]"
     if value is None:
         return "none"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:.10g}" if isinstance(value, float) else str(value)

@@ -1,5 +1,8 @@
 // The cart pendulum on a canvas. theta = 0 hangs where g < 0 and stands where g > 0; the bob is l sin(theta) beside the cart.
 
+const [LEAST, MOST] = [190, 360]; // pixels a metre
+const LABELS = 10; // pixels below
+
 class Cart {
   constructor(canvas) {
     this.canvas = canvas;
@@ -21,17 +24,20 @@ class Cart {
 
   draw(time) {
     const { canvas, pen, run } = this;
-    const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
+    const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth;
+    const wide = this.right - this.left, tall = this.top - this.bottom;
+    const scale = (this.scale = Math.min(Math.max(width / wide, LEAST), MOST));
+    const height = Math.round(scale * tall + LABELS);
+    canvas.style.height = `${height}px`;
     if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
       [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
     }
-    this.scale = Math.min(width / (this.right - this.left), height / (this.top - this.bottom));
-    this.x0 = width / 2 - (this.scale * (this.left + this.right)) / 2;
-    this.y0 = height / 2 + (this.scale * (this.top + this.bottom)) / 2;
+    const h = at(run, "h", time), room = Math.max(wide - width / scale, 0) / 2, middle = (this.left + this.right) / 2;
+    this.x0 = width / 2 - scale * Math.min(Math.max(h, middle - room), middle + room); // follows where not all fits
+    this.y0 = scale * this.top;
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.clearRect(0, 0, width, height);
     this.track(width);
-    const h = at(run, "h", time);
     if (run.reference_h) {
       const look = { stroke: colour("--quiet"), dash: [2, 4] };
       this.cart(at(run, "reference_h", time), at(run, "reference_theta", time), look);
@@ -100,7 +106,7 @@ class Cart {
     const length = (force / this.strongest) * 0.5 * scale, side = Math.sign(length);
     if (Math.abs(length) < 2) return;
     const from = x0 + h * scale + side * (0.13 * scale + 3), to = from + length, head = Math.min(7, Math.abs(length));
-    pen.strokeStyle = pen.fillStyle = `rgb(${colour("--above")})`;
+    pen.strokeStyle = pen.fillStyle = colour("--ink");
     pen.setLineDash([]);
     pen.lineWidth = 3;
     pen.beginPath();

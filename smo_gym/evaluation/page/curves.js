@@ -1,7 +1,9 @@
 // The plots: figures from Python, filled with the chosen runs and dressed for light or dark.
 
 const figures = read("figures");
-const faint = 0.28;
+const [FAINT, OTHER, CHOSEN] = [0, 1, 2];
+const FORCE = ["force_low", "force_high", "force"];
+const KINDS = [["truth", "error"], ["truth", "error", ...FORCE], ["truth", "estimate", "reference", "error", ...FORCE]];
 
 function dressed(figure) {
   const { layout } = figure;
@@ -14,6 +16,12 @@ function dressed(figure) {
   for (const shape of layout.shapes ?? []) shape.line.color = ink;
   for (const trace of figure.data) if (trace.meta?.ink) trace.line.color = colour("--quiet");
   return figure;
+}
+
+// A figure from Python has the arms' colours on light ground.
+function tinted(figure) {
+  const text = JSON.stringify(figure);
+  return JSON.parse(Object.keys(data.colours).reduce((all, arm) => all.replaceAll(data.colours[arm][0], palette(arm)), text));
 }
 
 function plot(id, figure) {
@@ -34,18 +42,18 @@ function filled(template, run, states, look) {
   const trace = { ...structuredClone(template), x: run.time, y };
   if (kind === "estimate") trace.line.color = colour("--ink");
   else if (kind === "reference") trace.line.color = colour("--quiet");
-  else trace.line = { ...trace.line, color: translucent(look.colour, look.faint ? faint : 1) };
-  if (look.faint) trace.line.width = 1;
+  else trace.line = { ...trace.line, color: translucent(look.colour, look.rank === FAINT ? 0.28 : 1) };
+  if (look.rank === FAINT) trace.line.width = 1;
   if (trace.fill) trace.fillcolor = translucent(look.colour, 0.18);
   if (kind === "truth") {
     trace.name = data.arms[look.arm];
     trace.legendgroup = look.arm;
-    trace.showlegend = state === 0 && look.named;
-  } else trace.showlegend = Boolean(trace.showlegend) && look.chosen;
+    trace.showlegend &&= look.rank !== FAINT;
+  }
   return trace;
 }
 
-// Other observers and other runs behind, faint ones first; the chosen run in front.
+// Faint other runs behind, other observers before them, the chosen run in front.
 function curves(group, index, display) {
   const positions = display.states.value === "positions";
   const states = positions ? STATES.slice(0, 2) : STATES.slice(2);
@@ -53,25 +61,21 @@ function curves(group, index, display) {
   const groups = display.arms.checked ? data.groups.filter(alike) : [group];
   const shown = [];
   for (const other of groups) {
-    const look = { arm: other.arm, colour: data.colours[other.arm] };
-    for (let r = 0; display.runs.checked && r < other.runs; r++) {
-      if (r !== index) shown.push({ run: load(other, r), look: { ...look, faint: true }, kinds: ["truth", "error"] });
+    for (let r = 0; r < other.runs; r++) {
+      const rank = r !== index ? FAINT : other === group ? CHOSEN : OTHER;
+      if (rank === FAINT && !display.runs.checked) continue;
+      shown.push({ run: load(other, r), look: { arm: other.arm, colour: palette(other.arm), rank } });
     }
   }
-  for (const other of groups) {
-    const chosen = other === group;
-    const look = { arm: other.arm, colour: data.colours[other.arm], chosen, named: true };
-    const kinds = chosen ? null : ["truth", "error", "force_low", "force_high", "force"];
-    shown.push({ run: load(other, index), look, kinds, last: chosen });
-  }
-  shown.sort((a, b) => Boolean(a.look.faint) < Boolean(b.look.faint) ? 1 : -1).sort((a, b) => Boolean(a.last) - Boolean(b.last));
+  shown.sort((a, b) => a.look.rank - b.look.rank);
   const figure = structuredClone(figures.curves);
-  figure.data = shown.flatMap(({ run, look, kinds }) =>
+  figure.data = shown.flatMap(({ run, look }) =>
     figures.curves.data
-      .filter(({ meta }) => !kinds || kinds.includes(meta.kind))
+      .filter(({ meta }) => KINDS[look.rank].includes(meta.kind))
       .map((template) => filled(template, run, states, look))
       .filter((trace) => trace !== null),
   );
+  figure.layout.uirevision = `${group.table} ${positions}`; // keeps what is enlarged from run to run
   figure.layout.meta[positions ? "positions" : "velocities"].forEach((title, row) => {
     figure.layout.annotations[row].text = title;
   });

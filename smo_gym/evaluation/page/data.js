@@ -3,6 +3,8 @@
 const $ = (selector, from = document) => from.querySelector(selector);
 const read = (id) => JSON.parse($(`#${id}`).textContent);
 const data = read("data");
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const palette = (arm) => data.colours[arm][dark.matches ? 1 : 0];
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 async function inflate(id) {
@@ -65,6 +67,8 @@ function load(group, index) {
 
 // A channel at a time between two instants.
 function at(run, name, time) {
-  const place = Math.min(time / run.time[1], run.time.length - 1), k = Math.min(Math.floor(place), run.time.length - 2);
+  const last = run.time.length - 1;
+  if (last === 0) return run[name][0];
+  const place = Math.min(time / run.time[1], last), k = Math.min(Math.floor(place), last - 1);
   return run[name][k] + (place - k) * (run[name][k + 1] - run[name][k]);
 }

@@ -41,8 +41,8 @@ function choose(wanted) {
 
 function show() {
   run = load(chosen, index);
-  stage.show(run, chosen.plants[index], data.colours[chosen.arm]);
-  document.documentElement.style.setProperty("--arm", data.colours[chosen.arm]);
+  stage.show(run, chosen.plants[index], palette(chosen.arm));
+  document.documentElement.style.setProperty("--arm", palette(chosen.arm));
   $(".stage").classList.toggle("no-reference", chosen.reference === null);
   player.end = run.time.at(-1);
   slider.max = player.end;
@@ -101,9 +101,9 @@ function play(on) {
 }
 
 function compare() {
-  if (figures.scatter) plot("scatter", figures.scatter);
+  if (figures.scatter) plot("scatter", tinted(figures.scatter));
   else $("#compared-scatter").hidden = true;
-  plot("bars", figures.bars[$("#bars-of").value]);
+  plot("bars", tinted(figures.bars[$("#bars-of").value]));
 }
 
 form.addEventListener("change", () => choose(Object.fromEntries([...KEYS, "run"].map((key) => [key, form[key].value]))));
@@ -145,7 +145,7 @@ try {
   $("#curves").on("plotly_click", ({ points }) => seek(points[0].x));
   compare();
   new ResizeObserver(() => stage.draw(player.time)).observe($("#stage"));
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  dark.addEventListener("change", () => {
     show();
     compare();
   });
