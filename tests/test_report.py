@@ -3,8 +3,6 @@
 import importlib.util
 import json
 import math
-import os
-import subprocess
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -47,7 +45,7 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.tags, self.rows, self.scripts, self._script = [], [], {}, None
+        self.tags, self.rows, self.scripts, self._script, self._cell = [], [], {}, None, False
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
@@ -57,16 +55,18 @@ class Page(HTMLParser):
             self._script = attributes.get("id", "")
         if tag == "tr":
             self.rows.append([])
-        if tag in ("td", "th") and self.rows:
+        if tag in ("td", "th"):
             self.rows[-1].append("")
+            self._cell = True
 
     def handle_endtag(self, tag):
         self._script = None if tag == "script" else self._script
+        self._cell = self._cell and tag not in ("td", "th")
 
     def handle_data(self, data):
         if self._script is not None:
             self.scripts[self._script] = data
-        elif self.rows and self.rows[-1]:
+        elif self._cell:
             self.rows[-1][-1] += data.strip()
 
 
@@ -130,53 +130,58 @@ def test_few_enough_runs_are_kept(page, monkeypatch):
     assert packing.runs_that_fit(page[0]) == 1
 
 
-def evaluate(*arguments, **environment):
-    command = [sys.executable, str(ROOT / "agents" / "evaluate.py"), *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, env=os.environ | environment, check=False)
-
-
-def test_the_command_writes_a_report_with_and_without_figures(tmp_path):
-    config = tmp_path / "short.yaml"
-    config.write_text(f"extends: {ROOT}/configs/regulation.yaml\nhorizon: {{value: 0.5, source: chosen}}\n")
-    common = ("--config", config, "--controller", "lqr", "--runs", "2", "--out", tmp_path / "out")
-    for name, more in (("new/plain.html", ()), ("both.html", ("--figures",))):
-        done = evaluate(*common, *more, "--report", tmp_path / name)
-        assert done.returncode == 0, done.stderr
-        assert str(tmp_path / name) in done.stdout
-        assert f"--report {tmp_path / name}" in (tmp_path / name).read_text()
-
-
-def test_what_cannot_be_reported_is_said_before_any_run(tmp_path):
-    done = evaluate("--report", tmp_path, "--out", tmp_path / "out")
-    assert done.returncode == 2
-    assert "is a folder" in done.stderr
-    (tmp_path / "plotly.py").write_text("raise ModuleNotFoundError(name='plotly')\n")
-    path = f"{tmp_path}{os.pathsep}{ROOT}"
-    done = evaluate("--report", tmp_path / "r.html", "--out", tmp_path / "out", PYTHONPATH=path)
-    assert done.returncode == 2
-    assert 'a report needs plotly: pip install "smo_gym[report]"' in done.stderr
-    assert not (tmp_path / "out").exists()
-    with pytest.raises(ValueError, match="no runs to draw"):
-        report.check([], tmp_path / "r.html")
-
-
-def test_an_interruption_leaves_the_old_report(tmp_path, monkeypatch):
+@pytest.fixture
+def evaluate():
+    """The command's function."""
     spec = importlib.util.spec_from_file_location("evaluate", ROOT / "agents" / "evaluate.py")
     command = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(command)
+    return lambda *arguments: command.main(list(map(str, arguments)))
+
+
+def short(tmp_path):
     config = tmp_path / "short.yaml"
     config.write_text(f"extends: {ROOT}/configs/regulation.yaml\nhorizon: {{value: 0.1, source: chosen}}\n")
-    old = tmp_path / "report.html"
-    old.write_text("old")
+    return ["--config", config, "--controller", "lqr", "--runs", "2", "--out", tmp_path / "out"]
+
+
+def test_the_command_writes_a_report_beside_figures(evaluate, tmp_path, capsys):
+    path = tmp_path / "new" / "report.html"
+    assert evaluate(*short(tmp_path), "--figures", "--report", path) == 0
+    assert str(path) in capsys.readouterr().out
+    assert f"--figures --report {path}" in path.read_text()
+    assert any((tmp_path / "out" / "figures").iterdir())
+
+
+def test_what_cannot_be_reported_is_said_before_any_run(evaluate, tmp_path, capsys, monkeypatch):
+    arguments = [*short(tmp_path), "--report"]
+    assert evaluate(*arguments, tmp_path) == 2
+    assert "is a folder" in capsys.readouterr().err
+    assert evaluate(*arguments, tmp_path / "short.yaml" / "report.html") == 2
+    assert f"--report {tmp_path / 'short.yaml'}: cannot be written to" in capsys.readouterr().err
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    assert evaluate(*arguments, tmp_path / "report.html") == 2
+    assert 'a report needs plotly: pip install "smo_gym[report]"' in capsys.readouterr().err
+    monkeypatch.undo()
+    assert not (tmp_path / "out").exists()
+    with pytest.raises(ValueError, match="no runs to draw"):
+        report.check([], tmp_path / "report.html")
+
+
+def test_an_interruption_leaves_the_old_report(evaluate, tmp_path, monkeypatch):
+    path = tmp_path / "report.html"
+    arguments = [*short(tmp_path), "--report", path]
+    assert evaluate(*arguments) == 0
+    old = path.read_text()
+    assert old.startswith("<!doctype html>")
 
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    arguments = ["--config", str(config), "--runs", "1", "--out", str(tmp_path / "out"), "--report", str(old)]
     monkeypatch.setattr(report, "render", interrupted)
-    assert command.main(arguments) == 130
+    assert evaluate(*arguments) == 130
     monkeypatch.setattr(files.os, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        files.write(old, "new")
-    assert old.read_text() == "old"
+        files.write(path, "new")
+    assert path.read_text() == old
     assert {path.name for path in tmp_path.iterdir()} == {"short.yaml", "report.html", "out"}

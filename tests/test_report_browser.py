@@ -97,56 +97,56 @@ def test_the_animation_moves_until_it_is_paused(opened):
     assert page.evaluate("window.hacked") is None
 
 
-@pytest.mark.parametrize(("table", "controller"), [("4", "lqr"), ("7", "smc-tracking")])
-def test_curves_and_readings_are_the_measured_runs(opened, report, table, controller):
+def test_curves_and_readings_are_the_measured_runs(opened, report):
     page = opened()
-    choose(page, table, controller, uncertainty="20 %", run="2")
-    wanted = (table, controller, 0.2, "with")
-    (outcome,) = (
-        o for o in report[0] if (o.group.scenario.table, o.group.name, o.group.uncertainty, o.group.arm) == wanted
-    )
-    traces = outcome.traces
-    alive = traces.time <= outcome.metrics["duration"][2] + 1e-9
-    page.wait_for_function(f"document.querySelector('#curves').data[0].y.length === {alive.sum()}")
-    drawn = page.evaluate("document.querySelector('#curves').data.map(one => [one.meta, [...one.y]])")
-    expected = {
-        "truth": traces.x[..., 2],
-        "estimate": traces.xhat[..., 2],
-        "error": (traces.x - traces.xhat)[..., 2],
-        "reference": traces.x_d,
-        "force_high": traces.u_high[:, [2]],
-    }
-    counts = {"truth": 2, "estimate": 2, "error": 2, "force_high": 1, "reference": 2 * (table == "7")}
-    for kind, count in counts.items():
-        found = [(meta.get("state", 0), y) for meta, y in drawn if meta["kind"] == kind]
-        assert len(found) == count
-        for state, y in found:
-            values = expected[kind][alive, state]
-            step = 2e-3 if kind == "force_high" else 2e-4
-            np.testing.assert_allclose(y, values, atol=step * np.ptp(values) + 1e-6)
-    seek(page, traces.time[10])
-    readings = page.locator(".readout tbody tr").first.locator("td").all_inner_texts()
-    shown = [float(text.replace("\u2212", "-")) for text in readings[:4]]
-    assert shown == pytest.approx(traces.x[10, :, 2], abs=2e-3)
+    for table, controller in (("4", "lqr"), ("7", "smc-tracking")):
+        choose(page, table, controller, uncertainty="20 %", run="3")
+        wanted = (table, controller, 0.2, "with")
+        groups = [(o.group.scenario.table, o.group.name, o.group.uncertainty, o.group.arm) for o in report[0]]
+        outcome = report[0][groups.index(wanted)]
+        traces = outcome.traces
+        alive = traces.time <= outcome.metrics["duration"][2] + 1e-9
+        drawn = page.evaluate("document.querySelector('#curves').data.map(one => [one.meta, [...one.y]])")
+        expected = {
+            "truth": traces.x[..., 2],
+            "estimate": traces.xhat[..., 2],
+            "error": (traces.x - traces.xhat)[..., 2],
+            "reference": traces.x_d,
+            "force_high": traces.u_high[:, [2]],
+        }
+        counts = {"truth": 2, "estimate": 2, "error": 2, "force_high": 1, "reference": 2 * (table == "7")}
+        for kind, count in counts.items():
+            found = [(meta.get("state", 0), y) for meta, y in drawn if meta["kind"] == kind]
+            assert len(found) == count
+            for state, y in found:
+                values = expected[kind][alive, state]
+                step = 2e-3 if kind == "force_high" else 2e-4
+                np.testing.assert_allclose(y, values, atol=step * np.ptp(values) + 1e-6)
+        seek(page, traces.time[10])
+        readings = page.locator(".readout tbody tr").first.locator("td").all_inner_texts()
+        shown = [float(text.replace("\u2212", "-")) for text in readings[:4]]
+        np.testing.assert_allclose(shown, traces.x[10, :, 2], atol=6e-4 + 1e-4 * np.ptp(traces.x[..., 2]))
 
 
-@pytest.mark.parametrize(("table", "sign"), [("4", 1), ("upright", -1)])
-def test_the_bob_hangs_below_the_cart_or_stands_above(opened, table, sign):
+def test_the_bob_hangs_below_the_cart_or_stands_above(opened):
     page = opened()
-    choose(page, table, "lqr")
-    seek(page, 2.0)
-    bob, cart = page.evaluate(
-        """() => {
-            const canvas = document.querySelector('#stage'), rows = [[], []];
-            const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
-            for (let k = 0; k < data.length; k += 4) {
-                const blue = data[k] < 10 && data[k + 2] > 150;
-                if (blue && data[k + 3] > 0) rows[+(data[k + 3] < 255)].push(k / 4 / canvas.width);
-            }
-            return rows.map((some) => some.reduce((a, b) => a + b, 0) / some.length);
-        }"""
-    )
-    assert sign * (bob - cart) > 20
+    for table, sign in (("4", 1), ("upright", -1)):
+        choose(page, table, "lqr")
+        seek(page, 2.0)
+        bob, cart = page.evaluate(
+            """() => {
+                const canvas = document.querySelector('#stage'), { width, height } = canvas, rows = [[], []];
+                const copy = new OffscreenCanvas(width, height).getContext('2d', { willReadFrequently: true });
+                copy.drawImage(canvas, 0, 0);
+                const { data } = copy.getImageData(0, 0, width, height);
+                for (let k = 0; k < data.length; k += 4) {
+                    const blue = data[k] < 10 && data[k + 2] > 150; // the bob opaque, the cart translucent
+                    if (blue && data[k + 3] > 0) rows[+(data[k + 3] < 255)].push(k / 4 / width);
+                }
+                return rows.map((some) => some.reduce((a, b) => a + b, 0) / some.length);
+            }"""
+        )
+        assert sign * (bob - cart) > 20
 
 
 def test_filters_change_the_tables(opened, report):

@@ -12,21 +12,17 @@ import math
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..article import OBSERVER_GAINS
-from ..plant import CartPendulum
 from . import charts, files, tables
 from .packing import CHANNELS, LEVELS, pack, runs_that_fit
-from .scenario import Scenario
+from .sources import sources
 from .statistics import Result, place
 from .study import ARMS, Group, Outcome
 
 _SCRIPTS = ("data.js", "cart.js", "curves.js", "tables.js", "page.js")
-_PLANT = {"cart_mass": "kg; M_c", "bob_mass": "kg; m", "rod_length": "m; l", "gravity": "m/s²; g"}
 
 
 def check(groups: Sequence[Group], path: Path) -> None:
@@ -73,7 +69,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
     places, packed = pack(outcomes, runs)
     groups = [_group(outcome, where) for outcome, where in zip(outcomes, places, strict=True)]
     header, diagnosed = tables.diagnosed(outcomes)
-    settings = _settings(outcomes)
+    settings = sources(outcomes)
     figures = {
         "curves": charts.curves(),
         "scatter": charts.scatter(results),
@@ -200,62 +196,3 @@ def _mark(result: Result) -> dict[str, float | str] | None:
         "look": "near" if level == 0 else f"{'above' if off > 0.0 else 'below'}-{level}",
         "sign": "" if level == 0 else "▲" if off > 0.0 else "▼",
     }
-
-
-def _settings(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
-    """Every setting with its source; those that scenarios share once, with the tables that it belongs to."""
-    scenarios = {id(o.group.scenario): o.group.scenario for o in outcomes}
-    found: dict[tuple[str, str, str, str], list[str]] = {}
-    for scenario in scenarios.values():
-        for row in (*_plant(scenario, outcomes), *_walk(scenario.model_dump(mode="json"), ())):
-            found.setdefault(row, []).append(scenario.table)
-    order = list(dict.fromkeys(row[0] for row in found))
-    return [
-        {
-            "name": row[0],
-            "value": row[1],
-            "source": row[2],
-            "note": row[3],
-            "tables": ", ".join(dict.fromkeys(found[row])),
-        }
-        for row in sorted(found, key=lambda row: order.index(row[0]))
-    ]
-
-
-def _plant(scenario: Scenario, outcomes: Sequence[Outcome]) -> Iterable[tuple[str, str, str, str]]:
-    """The nominal plant, which the runs at 0 % have."""
-    plant = CartPendulum.of(
-        next(
-            o.plants[0]
-            for o in outcomes
-            if o.group.scenario is scenario and o.group.uncertainty == 0.0 and o.plants is not None
-        )
-    )
-    printed = asdict(CartPendulum())
-    for name, value in asdict(plant).items():
-        same = value == printed[name]
-        note = f"{_PLANT[name]}; {'Table 2' if same else scenario.environment}"
-        yield f"plant.{name}", f"{value:g}", "printed" if same else "chosen", note
-
-
-def _walk(data: Any, path: tuple[str, ...]) -> Iterable[tuple[str, str, str, str]]:
-    if isinstance(data, dict) and {"value", "source"} <= data.keys():
-        value = data["value"]
-        named = path[-1] == "gains" and isinstance(value, str)  # a column of Table 3
-        yield ".".join(path), _text(OBSERVER_GAINS[value] if named else value), data["source"], data["note"]
-    elif isinstance(data, dict):
-        for name, inner in data.items():
-            if path or name not in ("table", "title", "suffix"):  # these are headings
-                yield from _walk(inner, (*path, name))
-    elif data is not None:
-        yield ".".join(path), _text(data), "", ""
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, dict):
-        return "; ".join(f"{name}: {_text(inner)}" if name else _text(inner) for name, inner in value.items())
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_text, value))}]"
-    if value is None:
-        return "none"
-    return f"{value:.10g}" if isinstance(value, float) else str(value)

@@ -33,9 +33,9 @@ function choose(wanted) {
     left = left.filter((group) => values[key](group) === form[key].value);
   }
   [chosen] = left;
-  const runs = Array.from({ length: chosen.runs }, (_, r) => [String(r), `${r + 1}${chosen.failed[r] ? " (failed)" : ""}`]);
+  const runs = Array.from({ length: chosen.runs }, (_, r) => [String(r + 1), `${r + 1}${chosen.failed[r] ? " (failed)" : ""}`]);
   options(form.run, runs, wanted.run);
-  index = Number(form.run.value);
+  index = Number(form.run.value) - 1;
   show();
 }
 
