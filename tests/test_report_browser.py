@@ -93,7 +93,16 @@ def test_the_animation_moves_until_it_is_paused(opened):
     assert seconds(page) == pytest.approx(stopped + 0.05, abs=0.011)
     page.keyboard.press("Space")
     page.wait_for_function(f"parseFloat(document.querySelector('#time').value) > {stopped + 0.2}")
-    assert page.evaluate("document.querySelector('#curves').layout.shapes[0].x0") > stopped
+    page.click("#play")
+    seek(page, 2.0)
+    cursor, expected = page.evaluate(
+        """() => {
+            const curves = document.querySelector('#curves'), axis = curves._fullLayout.xaxis;
+            const left = (element) => element.getBoundingClientRect().x;
+            return [left(document.querySelector('#cursor')), left(curves) + axis._offset + axis.l2p(2.0)];
+        }"""
+    )
+    assert cursor == pytest.approx(expected, abs=1.0)
     assert page.evaluate("window.hacked") is None
 
 

@@ -64,9 +64,10 @@ def curves() -> Figure:
     figure.add_trace(force, 5, 1)
     figure.update_traces(hovertemplate="%{y:.4g} at %{x:.2f} s", selector={"hoverinfo": None})
     figure.update_xaxes(title_text="t (s)", row=5, col=1)
-    cursor = {"type": "line", "xref": "x", "yref": "paper", "x0": 0, "x1": 0, "y0": 0, "y1": 1, "line": {"width": 1}}
     legend = {"x": 1.0, "xanchor": "right", "y": 1.015}
-    return _quiet(figure, 900, shapes=[cursor], meta=AXES, legend=legend, margin_t=60)  # room for Plotly's buttons
+    _quiet(figure, 900, meta=AXES, legend=legend, margin_t=60)  # room for Plotly's buttons
+    figure.update_yaxes(automargin=False)
+    return figure.update_layout(margin_autoexpand=False)  # the page's cursor relies on the margins
 
 
 def scatter(results: Sequence[Result]) -> Figure | None:

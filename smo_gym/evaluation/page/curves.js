@@ -13,7 +13,8 @@ function dressed(figure) {
   for (const [name, axis] of Object.entries(layout)) {
     if (/^[xy]axis/.test(name)) Object.assign(axis, { gridcolor: line, zerolinecolor: line });
   }
-  for (const shape of layout.shapes ?? []) shape.line.color = ink;
+  layout.modebar = { bgcolor: clear, color: colour("--quiet"), activecolor: ink };
+  for (const one of layout.annotations ?? []) one.bgcolor = colour("--ground");
   for (const trace of figure.data) if (trace.meta?.ink) trace.line.color = colour("--quiet");
   return figure;
 }

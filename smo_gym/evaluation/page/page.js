@@ -55,7 +55,7 @@ function show() {
       ? `The run failed at ${chosen.duration[index].toFixed(2)} s and ends there.`
       : `MSE of h ${measured[0]} m², of θ ${measured[1]} rad².`);
   $("#stage").setAttribute("aria-label", `Cart pendulum, ${KEYS.map((key) => names[key](chosen)).join(", ")}, run ${index + 1}`);
-  if (ready) curves(chosen, index, display).then(() => cursor(true));
+  if (ready) curves(chosen, index, display).then(cursor);
   seek(Math.min(player.time, player.end));
 }
 
@@ -72,14 +72,16 @@ function seek(time) {
     });
   });
   rows[0].cells[5].textContent = number(at(run, "force", player.time), 1);
-  cursor(!player.playing);
+  cursor();
 }
 
-let moved = 0;
-function cursor(now) {
-  if (!ready || (!now && performance.now() - moved < 100)) return;
-  moved = performance.now();
-  Plotly.relayout("curves", { "shapes[0].x0": player.time, "shapes[0].x1": player.time });
+// A line behind the curves: moving a shape of Plotly's takes too long for every frame.
+function cursor() {
+  if (!ready) return;
+  const { margin, xaxis } = $("#curves").layout, [from, to] = xaxis.range;
+  const share = (player.time - from) / (to - from), width = $("#curves").clientWidth - margin.l - margin.r;
+  $("#cursor").hidden = !(share >= 0 && share <= 1);
+  $("#cursor").style.transform = `translateX(${margin.l + share * width}px)`;
 }
 
 function play(on) {
@@ -107,7 +109,7 @@ function compare() {
 }
 
 form.addEventListener("change", () => choose(Object.fromEntries([...KEYS, "run"].map((key) => [key, form[key].value]))));
-display.addEventListener("change", () => curves(chosen, index, display).then(() => cursor(true)));
+display.addEventListener("change", () => curves(chosen, index, display).then(cursor));
 button.addEventListener("click", () => play(!player.playing));
 slider.addEventListener("input", () => seek(Number(slider.value)));
 $("#stage").addEventListener("keydown", (event) => {
@@ -143,8 +145,10 @@ try {
   ready = true;
   await curves(chosen, index, display);
   $("#curves").on("plotly_click", ({ points }) => seek(points[0].x));
+  $("#curves").on("plotly_relayout", cursor);
+  cursor();
   compare();
-  new ResizeObserver(() => stage.draw(player.time)).observe($("#stage"));
+  new ResizeObserver(() => seek(player.time)).observe($("#stage"));
   dark.addEventListener("change", () => {
     show();
     compare();
