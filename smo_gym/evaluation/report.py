@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from . import charts, files, tables
+from .figures import WINDOW
 from .packing import CHANNELS, LEVELS, pack, runs_that_fit
 from .sources import sources
 from .statistics import Result, place
@@ -101,6 +102,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         diagnosed=diagnosed,
         settings=settings,
         sources=Counter(row["source"] for row in settings),
+        window=WINDOW,
         command=command,
         versions=versions,
     )
@@ -119,7 +121,8 @@ def _json(figures: Mapping[str, Any]) -> str:
 
 def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
     """What the page must know of a group to name, find, unpack and draw its runs."""
-    group, traces = outcome.group, outcome.traces
+    group, traces, metrics = outcome.group, outcome.traces, outcome.metrics
+    shown = slice(where["runs"])
     assert traces is not None
     assert outcome.plants is not None
     return {
@@ -132,10 +135,10 @@ def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
         "start": [float(value) for value in group.scenario.initial_states.value[group.case]],
         "arm": group.arm,
         "period": float(traces.time[1]) if len(traces.time) > 1 else 1.0,
-        "failed": outcome.failed.tolist(),
-        "duration": [round(float(value), 6) for value in outcome.metrics["duration"]],
-        "plants": [[float(f"{value:.4g}") for value in plant] for plant in outcome.plants],
-        **{name: [_short(value) for value in outcome.metrics[name]] for name in ("mse_h", "mse_theta")},
+        "failed": outcome.failed[shown].tolist(),
+        "duration": [round(float(value), 6) for value in metrics["duration"][shown]],
+        "plants": [[float(f"{value:.4g}") for value in plant] for plant in outcome.plants[shown]],
+        **{name: [_short(value) for value in metrics[name][shown]] for name in ("mse_h", "mse_theta")},
     }
 
 
