@@ -2,8 +2,8 @@
 
     python agents/evaluate.py --controller all --scenario all
 
-Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and the resolved settings to --out, and with
---figures the article's Figures 3-17 as PDF and PNG to --out/figures.
+Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and the resolved settings to --out, with
+--figures the article's Figures 3-17 as PDF and PNG to --out/figures, and with --report a page to look at it all.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import shlex
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -20,7 +21,7 @@ from pathlib import Path
 import yaml
 from tqdm import tqdm
 
-from smo_gym.evaluation import agents, figures, files, scenario, study, tables
+from smo_gym.evaluation import agents, figures, files, report, scenario, study, tables
 from smo_gym.evaluation.statistics import results
 from smo_gym.validation import number, unknown
 
@@ -79,6 +80,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         help="limit in newtons in place of the scenario's, for all controllers",
     )
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
+    add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
     return parser.parse_args(arguments)
 
@@ -191,6 +193,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         arms = chosen_arms(args.observer, args.compensation)
         groups = study.groups(scenarios, controllers, arms, args.runs)
         drawn, left_out = figures.planned(groups) if args.figures else ([], [])
+        if args.report:
+            report.check(groups, args.report)
         out = files.prepare(args.out)
         pictures = files.prepare(out / "figures") if drawn else out
     except (ValueError, ImportError) as error:
@@ -209,7 +213,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             leave=False,
             disable=None,
         ) as bar:
-            outcomes = study.measure(groups, args.seed, bar.update, figures.SAMPLES if drawn else None)
+            samples = figures.SAMPLES if drawn or args.report else None
+            outcomes = study.measure(groups, args.seed, bar.update, samples)
     except KeyboardInterrupt:
         print("evaluate.py: interrupted, nothing was written", file=sys.stderr)
         return 130
@@ -220,10 +225,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(tables.render(numbers, "simple", rms=False))
     print(tables.diagnostics(outcomes, "simple"))
     print(f"\n{tables.summary(numbers)}")
+    versions = {"python": platform.python_version()}
+    versions |= {name: metadata.version(name) for name in ("smo_gym", "gymnasium", "numba", "numpy", "scipy")}
     resolved = {
         "command": {key: str(value) if isinstance(value, Path) else value for key, value in vars(args).items()},
-        "versions": {"python": platform.python_version()}
-        | {name: metadata.version(name) for name in ("smo_gym", "gymnasium", "numba", "numpy", "scipy")},
+        "versions": versions,
         "scenarios": [one.model_dump(mode="json") for one in scenarios],
     }
     notes = tables.diagnostics(outcomes, "github")
@@ -240,12 +246,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             figure = figures.draw(plan, outcomes, numbers)
             for form in figures.FORMATS:
                 files.write_bytes(pictures / f"{plan.name}.{form}", figures.encode(figure, form))
+        if args.report:
+            command = shlex.join(["python", "agents/evaluate.py", *(sys.argv[1:] if arguments is None else arguments)])
+            files.write(args.report, report.render(outcomes, numbers, command, versions))
     except KeyboardInterrupt:
         print(f"evaluate.py: interrupted while drawing; the tables are in {out}", file=sys.stderr)
         return 130
     if left_out:
         print(f"\nno runs for Figure {', '.join(str(plan.number) for plan in left_out)}: not drawn")
-    print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {out}")
+    where = f"{out} and {args.report}" if args.report else out
+    print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {where}")
     return 0
 
 

@@ -5,18 +5,18 @@ import tempfile
 from pathlib import Path
 
 
-def prepare(folder: Path) -> Path:
+def prepare(folder: Path, option: str = "--out") -> Path:
     """Make a folder for results and prove that it can be written to, before any work is done for it.
 
     Raises:
-        ValueError: it cannot be made or written to.
+        ValueError: it cannot be made or written to; ``option`` asked for it.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise ValueError(f"--out {folder}: cannot be written to ({error.strerror})") from None
+        raise ValueError(f"{option} {folder}: cannot be written to ({error.strerror})") from None
     return folder
 
 
@@ -28,6 +28,11 @@ def write(path: Path, text: str) -> None:
 def write_bytes(path: Path, data: bytes) -> None:
     """The same of any file."""
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-        file.write(data)
-    os.chmod(file.name, 0o644)
-    os.replace(file.name, path)
+        try:
+            file.write(data)
+            file.flush()
+            os.chmod(file.name, 0o644)
+            os.replace(file.name, path)
+        except BaseException:  # an interruption too
+            Path(file.name).unlink(missing_ok=True)
+            raise

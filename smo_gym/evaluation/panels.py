@@ -30,10 +30,11 @@ COLOURS = {
 TITLES = {"lqr": "LQR", "smc": "SMC", "smc-tracking": "SMC tracking"}
 Columns = Mapping[str, Sequence[Outcome]]
 """What each column of panels shows, by its title."""
+WINDOW = 0.25
+"""s; chattering is averaged over it."""
 _POSITIONS = (("h", "m"), ("\\theta", "rad"))
 _WIDTH = 6.9  # in, a page's text
 _START = 3.0  # s, of the estimation errors
-_WINDOW = 0.25  # s; chattering is averaged over it
 _BAR_KINDS = ("published", "measured")
 
 
@@ -50,7 +51,7 @@ def states(columns: Columns) -> Figure:
     for column, (title, chosen) in zip(axes.T, columns.items(), strict=True):
         for j, panel in enumerate(column):
             for outcome in chosen:
-                traces = _traces(outcome)
+                traces = traced(outcome)
                 _lines(panel, outcome, traces.x[:, j], label=title != ARMS[outcome.group.arm])
             if traces.x_d is not None:
                 panel.plot(traces.time, traces.x_d[:, j], color="black", linewidth=1.2, label="reference")
@@ -67,7 +68,7 @@ def errors(outcomes: Sequence[Outcome]) -> Figure:
     for column, until in zip(axes.T, columns.values(), strict=True):
         for j, panel in enumerate(column):
             for outcome in outcomes:
-                traces = _traces(outcome)
+                traces = traced(outcome)
                 _lines(panel, outcome, traces.x[:, j] - traces.xhat[:, j], until, label=until == horizon)
     for panel, (state, unit) in zip(axes[:, 0], _POSITIONS, strict=True):
         panel.set_ylabel(f"${state} - \\hat{{{state}}}$ ({unit})")
@@ -80,17 +81,16 @@ def inputs(columns: Columns) -> Figure:
     figure, axes = _panels(len(arms), len(columns), 1.8 * len(arms), sharex=True, sharey="col")
     for column, chosen in zip(axes.T, columns.values(), strict=True):
         for outcome in chosen:
-            traces, panel = _traces(outcome), column[arms.index(outcome.group.arm)]
+            traces, panel = traced(outcome), column[arms.index(outcome.group.arm)]
             low, high = (_alive(outcome, values) for values in (traces.u_low, traces.u_high))
             some = np.isfinite(low).any(axis=1)
             span = (np.nanmin(low[some], axis=1), np.nanmax(high[some], axis=1))
             panel.fill_between(traces.time[some], *span, step="pre", color=_colour(outcome), alpha=0.2, linewidth=0.0)
-            window = max(int(np.searchsorted(traces.time, _WINDOW)), 1)
-            _lines(panel, outcome, uniform_filter1d(traces.u_mean, window, axis=0, mode="nearest"), label=False)
+            _lines(panel, outcome, smooth(traces.time, traces.u_mean), label=False)
     for panel, arm in zip(axes[:, 0], arms, strict=True):
         panel.set_ylabel(f"$F$ (N)\n{ARMS[arm]}")
     for column in axes.T:
-        column[0].plot([], [], color="0.3", linewidth=0.8, label=f"mean over {_WINDOW:g} s")
+        column[0].plot([], [], color="0.3", linewidth=0.8, label=f"mean over {WINDOW:g} s")
         column[0].fill_between([], [], color="0.3", alpha=0.2, linewidth=0.0, label="range")
     return _finished(figure, axes, list(columns))
 
@@ -138,7 +138,18 @@ def _bars(panel: Axes, name: str, cells: Sequence[Result]) -> None:
     panel.grid(visible=False, axis="x")
 
 
-def _traces(outcome: Outcome) -> Traces:
+def smooth(time: Array, force: Array) -> Array:
+    """Forces (m, runs) averaged over :data:`WINDOW`."""
+    window = max(int(np.searchsorted(time, WINDOW)), 1)
+    return np.asarray(uniform_filter1d(force, window, axis=0, mode="nearest"))
+
+
+def traced(outcome: Outcome) -> Traces:
+    """An outcome's traces.
+
+    Raises:
+        ValueError: it has none.
+    """
     if outcome.traces is None:
         raise ValueError(f"{outcome.group.name} has no traces to draw: measure() was asked for no samples")
     return outcome.traces
@@ -146,14 +157,14 @@ def _traces(outcome: Outcome) -> Traces:
 
 def _alive(outcome: Outcome, values: Array) -> Array:
     """Values (m, runs) without those after a run's failure."""
-    traces = _traces(outcome)
+    traces = traced(outcome)
     duration = outcome.metrics["duration"][: values.shape[1]]
     return np.where(traces.time[:, None] <= duration + 1e-9, values, np.nan)
 
 
 def _lines(panel: Axes, outcome: Outcome, values: Array, until: float = math.inf, label: bool = True) -> None:
     """One line a run of values (m, runs)."""
-    time = _traces(outcome).time
+    time = traced(outcome).time
     shown = time <= until
     lines = panel.plot(time[shown], _alive(outcome, values)[shown], color=_colour(outcome), linewidth=0.8, alpha=0.85)
     if label:

@@ -68,10 +68,10 @@ def _rows(outcomes: Sequence[Outcome]) -> list[Row]:
     tables: dict[tuple[str, str], dict[tuple[str, str], list[Outcome]]] = {}
     for outcome in outcomes:
         table = tables.setdefault((outcome.group.scenario.table, outcome.group.name), {})
-        table.setdefault(_place(outcome), []).append(outcome)
+        table.setdefault(place(outcome), []).append(outcome)
     found: list[Row] = []
     for table in tables.values():
-        found += [(rows, *place) for place, rows in table.items()]
+        found += [(rows, *where) for where, rows in table.items()]
         uncertain = [outcome for rows in table.values() for outcome in rows if outcome.group.uncertainty > 0.0]
         cases = any(uncertain[0].group.scenario.initial_states.value) if uncertain else False
         if uncertain:
@@ -79,7 +79,7 @@ def _rows(outcomes: Sequence[Outcome]) -> list[Row]:
     return found
 
 
-def _place(outcome: Outcome) -> tuple[str, str]:
+def place(outcome: Outcome) -> tuple[str, str]:
     """The columns uncertainty_percent and case; Table 5 leaves the level of its runs out, as printed."""
     group = outcome.group
     levels = group.scenario.uncertainty.value
@@ -128,7 +128,7 @@ def _runs(rows: Sequence[Outcome], state: str) -> tuple[Array, NDArray[np.bool_]
 
 def _published(rows: Sequence[Outcome], cell: Cell) -> float:
     """The printed number; of an average, the mean of the printed cells that it averages."""
-    keys = [replace(cell, uncertainty_percent=level, case=case) for level, case in map(_place, rows)]
+    keys = [replace(cell, uncertainty_percent=level, case=case) for level, case in map(place, rows)]
     numbers = [published().get(key, math.nan) for key in keys]
     return float(np.mean(numbers))
 

@@ -57,6 +57,8 @@ class Outcome:
     """(runs,)."""
     traces: Traces | None = None
     """Of its first :data:`TRACED_RUNS` runs, where :func:`measure` was asked for them."""
+    plants: Array | None = None
+    """[M_c, m, l, g] of these runs, (runs, 4)."""
 
     @property
     def left(self) -> NDArray[np.bool_] | None:
@@ -180,10 +182,11 @@ def _run(
     observed = VectorObserverWrapper(env, "oracle" if batch[0].arm == "oracle" else observers)
     edges = np.cumsum([group.runs for group in batch])[:-1]
     slots = [part[:TRACED_RUNS] for part in np.split(np.arange(n), edges)]
+    params = np.array(plants)
     result = rollout(
         observed,
         agent,
-        options={"state": np.array(states), "params": np.array(plants)},
+        options={"state": np.array(states), "params": params},
         trace_every=None if samples is None else max(task.steps // samples, 1),
         trace_slots=np.concatenate(slots).tolist(),
         progress=lambda steps: progress(steps * dt * n),
@@ -192,7 +195,7 @@ def _run(
     columns = {name: np.split(values, edges) for name, values in result.metrics.items()}
     traces = _split(result.traces, [len(part) for part in slots])
     return [
-        Outcome(group, {name: parts[i] for name, parts in columns.items()}, failed[i], traces[i])
+        Outcome(group, {name: parts[i] for name, parts in columns.items()}, failed[i], traces[i], params[slots[i]])
         for i, group in enumerate(batch)
     ]
 

@@ -17,12 +17,13 @@ from .metrics import NAMES
 from .statistics import Result
 from .study import ARMS, Outcome
 
-_HEADER = ("", "state", "compensation", "published", "measured", "95 % interval", "median", "ratio", "failed")
-_REDUCTION_HEADER = ("", "state", "published %", "measured %", "95 % interval", "median")
-_REDUCTION = "mse_reduction_percent"
+HEADER = ("", "state", "compensation", "published", "measured", "95 % interval", "median", "ratio", "failed")
+REDUCTION_HEADER = ("", "state", "published %", "measured %", "95 % interval", "median")
+REDUCTION = "mse_reduction_percent"
 
 
-def _by_table(results: Iterable[Result]) -> dict[tuple[str, str], list[Result]]:
+def by_table(results: Iterable[Result]) -> dict[tuple[str, str], list[Result]]:
+    """The results of each table and controller."""
     tables: dict[tuple[str, str], list[Result]] = {}
     for result in results:
         tables.setdefault((result.cell.table, result.cell.controller), []).append(result)
@@ -38,14 +39,14 @@ def render(results: Sequence[Result], form: str, *, rms: bool) -> str:
         rms: whether to show the RMS rows, which are the roots of the MSE rows, too.
     """
     parts = []
-    for (table, controller), rows in _by_table(results).items():
+    for (table, controller), rows in by_table(results).items():
         parts.append(_heading(f"Table {table}, {title(controller)}", form))
         shown = [row for row in rows if row.cell.metric == "mse" or (rms and row.cell.metric == "rms")]
-        parts.append(_table(form, _HEADER, [_cell_row(row) for row in shown]))
-        reductions = [row for row in rows if row.cell.metric == _REDUCTION]
+        parts.append(_table(form, HEADER, [cell_row(row) for row in shown]))
+        reductions = [row for row in rows if row.cell.metric == REDUCTION]
         if reductions:
             parts.append(_heading("Reduction of the MSE by the compensation", form, level=3))
-            parts.append(_table(form, _REDUCTION_HEADER, [_reduction_row(row) for row in reductions]))
+            parts.append(_table(form, REDUCTION_HEADER, [reduction_row(row) for row in reductions]))
         parts.append(verdict(rows))
     return "\n\n".join(parts) + "\n"
 
@@ -87,7 +88,12 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
-    """What else the runs showed, a mean over each controller's runs that did not fail.
+    """What else the runs showed, as a table."""
+    return _table(form, *diagnosed(outcomes))
+
+
+def diagnosed(outcomes: Sequence[Outcome]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows of what else the runs showed, a mean over each controller's runs that did not fail.
 
     The last column counts the runs that left the operating set which the theorem's gains are designed for.
     """
@@ -108,7 +114,7 @@ def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
                 left = [o.left for o in chosen if o.left is not None]
                 count = f"{np.concatenate(left).sum()} of {sum(map(len, left))}" if left else ""
                 rows.append((table, title(controller), arm, *means, count))
-    return _table(form, header, rows)
+    return header, rows
 
 
 _DIAGNOSTICS = {
@@ -161,7 +167,8 @@ def exact(value: float) -> object:
     return repr(float(value)) if math.isfinite(value) else ""
 
 
-def _label(cell: Cell) -> str:
+def label(cell: Cell) -> str:
+    """A cell's row: its case, its level of uncertainty, or both."""
     if cell.is_average:
         return "average"
     parts = [f"case {cell.case}"] * bool(cell.case) + [f"{cell.uncertainty_percent} %"] * bool(cell.uncertainty_percent)
@@ -172,11 +179,12 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if math.isfinite(value) else ""
 
 
-def _cell_row(row: Result) -> tuple[str, ...]:
+def cell_row(row: Result) -> tuple[str, ...]:
+    """A result under :data:`HEADER`."""
     ratio = math.exp(row.deviation)
     state = row.cell.state if row.cell.metric == "mse" else f"{row.cell.metric.upper()} {row.cell.state}"
     return (
-        _label(row.cell),
+        label(row.cell),
         state,
         row.cell.compensation,
         _number(row.published),
@@ -188,12 +196,14 @@ def _cell_row(row: Result) -> tuple[str, ...]:
     )
 
 
-def _reduction_row(row: Result) -> tuple[str, ...]:
+def reduction_row(row: Result) -> tuple[str, ...]:
+    """A reduction under :data:`REDUCTION_HEADER`."""
+
     def percent(value: float) -> str:
         return f"{value:.1f}" if math.isfinite(value) else ""
 
     numbers = (percent(row.published), percent(row.measured), _span(row, percent), percent(row.median))
-    return (_label(row.cell), row.cell.state, *numbers)
+    return (label(row.cell), row.cell.state, *numbers)
 
 
 def _span(row: Result, text: Callable[[float], str]) -> str:
