@@ -57,11 +57,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         from smo_gym.learning import aggregates, table
 
-        if args.runs < 1 or args.seed < 0 or not 0.0 < args.force_limit < math.inf:
-            raise ValueError(
-                f"--runs {args.runs} must be at least 1, --seed {args.seed} at least 0 and --force-limit "
-                f"{args.force_limit:g} a positive number of newtons"
-            )
+        if args.runs < 1:
+            raise ValueError(f"--runs {args.runs} must be at least 1")
+        if args.seed < 0:
+            raise ValueError(f"--seed {args.seed} must be at least 0")
+        if not 0.0 < args.force_limit < math.inf:
+            raise ValueError(f"--force-limit {args.force_limit:g} must be a positive number of newtons")
         limit = scenario.Setting[float | None](value=args.force_limit, source="chosen", note="command line")
         place = scenario.load(args.config).model_copy(update={"force_limit": limit})
         contenders, left_out = comparison.trained(args.folders, place.environment)
@@ -104,7 +105,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"{words}\n\nresults are in {out}")
     told = (
         "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
-        f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. LQR "
+        f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. Over "
+        "all levels: the mean of the levels' interquartile means, whose ratio the answers below are about. LQR "
         f"and SMC act every {place.control_period.value:g} s, policies as in their training. A failed run counts as "
         "the worst.\n"
     )

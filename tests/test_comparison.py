@@ -40,8 +40,9 @@ def policy(folder, seed, observation="smo", algorithm="ppo", push=0.0, environme
 
 
 def scores(values, title="smo", learned=True):
-    """Scores from numbers (policies, plants), at one level."""
-    values = np.asarray(values, dtype=float)[:, None]
+    """Scores from numbers (policies, levels, plants), or (policies, plants) at one level."""
+    values = np.asarray(values, dtype=float)
+    values = values if values.ndim == 3 else values[:, None]
     cards = tuple(None for _ in values) if learned else ()
     return Scores(Contender("PPO", title, ("",) * len(values), cards), values, values == FAILED)
 
@@ -95,10 +96,9 @@ def test_the_table_is_made_of_runs_of_the_harness(tmp_path, short, capsys):
     assert rows["RecurrentPPO", "positions", "all"]["ci_low"] == ""
     text = (out / "learning.md").read_text()
     for line in (
-        "- PPO on smo against PPO on positions: yes. Its interquartile mean is",
-        "- PPO on smo against RecurrentPPO on positions: open: an interval needs at least two training seeds.",
-        "- PPO on positions against LQR on smo: no, it is worse.",
-        "probability 1 [1, 1].",
+        "- PPO on smo against PPO on positions: open: a verdict needs five training seeds. Its interquartile mean is",
+        "- PPO on smo against RecurrentPPO on positions: open: a verdict needs five training seeds.",
+        "probability 1 [1, 1] (failed: 0 of 12 against 12 of 12).",
         "12 of 12",
         "7,000",
     ):
@@ -127,6 +127,42 @@ def test_pairs_share_their_plants():
     assert aggregates.compare(scores(plants), scores(0.99 * plants, "positions")).verdict == "no, it is worse"
     same = aggregates.compare(scores(plants), scores(plants, "positions"))
     assert (same.verdict, same.probability.value) == ("undecided", 0.5)
+
+
+def test_no_level_is_trimmed_away():
+    plants = np.random.default_rng(1).uniform(1.0, 5.0, (5, 1, 30)).repeat(6, axis=1)
+    better = 0.95 * plants
+    better[:, -1] = 100.0 * plants[:, -1]
+    *levels, overall = aggregates.interquartile_means(scores(better))
+    assert overall.value == pytest.approx(np.mean([level.value for level in levels]))
+    one = aggregates.compare(scores(better), scores(plants, "positions"))
+    assert one.verdict == "no, it is worse"
+    assert one.ratio.value == pytest.approx((5 * 0.95 + 100.0) / 6)
+
+
+def test_a_verdict_says_who_fails_more_often():
+    plants = np.random.default_rng(1).uniform(1.0, 5.0, (5, 30))
+    fails = 0.5 * plants
+    fails[:, :3] = FAILED
+    one = aggregates.compare(scores(fails), scores(plants, "positions"))
+    assert one.verdict == "yes, of the runs that stand; it fails more often"
+    assert table.sentence(one).endswith("(failed: 15 of 150 against 0 of 150).")
+    plants[:, :3] = FAILED
+    one = aggregates.compare(scores(fails), scores(plants, "positions"))
+    assert one.verdict == "yes"
+    assert table.sentence(one).endswith("(failed: 15 of 150 against 15 of 150).")
+
+
+def test_few_seeds_decide_nothing():
+    plants = np.random.default_rng(1).uniform(1.0, 5.0, (5, 30))
+    for a, b in ((4, 5), (5, 4), (2, 2)):
+        one = aggregates.compare(scores(0.5 * plants[:a]), scores(plants[:b], "positions"))
+        assert one.verdict == "open: a verdict needs five training seeds"
+        assert one.ratio.high < 1.0
+    law = scores(plants[:1], learned=False)
+    assert aggregates.compare(scores(0.1 * plants), law).verdict == "yes"
+    few = aggregates.compare(scores(plants[:, :1]), scores(plants[:, :1], "positions"))
+    assert few.verdict == "open: an interval needs at least two plants a level"
 
 
 def test_failed_runs_are_the_worst_and_are_not_dropped():
@@ -161,8 +197,9 @@ def test_bad_folders_are_named_before_any_run(tmp_path, short, capsys):
     policy(runs / "upright", 0, environment="SMOPendulumUpright-v0")
     assert "no policy for SMOPendulum-v0" in error(str(runs))
     policy(runs / "a", 0)
-    assert "--runs 0 must be at least 1" in error(str(runs), "--runs", "0")
-    assert "--force-limit -1" in error(str(runs), "--force-limit", "-1")
+    assert "error: --runs 0 must be at least 1\n" in error(str(runs), "--runs", "0")
+    assert "error: --seed -1 must be at least 0\n" in error(str(runs), "--seed", "-1")
+    assert "error: --force-limit -1 must be a positive number" in error(str(runs), "--force-limit", "-1")
     policy(runs / "b", 0)
     assert "have the same seed, 0" in error(str(runs))
     policy(tmp_path / "other", 1, control_period=0.01)

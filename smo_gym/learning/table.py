@@ -92,6 +92,7 @@ def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores
 def sentence(comparison: Comparison) -> str:
     """A comparison in words."""
     a, b, ratio, probability = comparison.a, comparison.b, comparison.ratio, comparison.probability
+    of_a, of_b = (f"{one.failed.sum()} of {one.failed.size}" for one in (a, b))
 
     def span(low: float, high: float) -> str:
         return "" if math.isnan(low) else f" [{low:.3g}, {high:.3g}]"
@@ -99,7 +100,8 @@ def sentence(comparison: Comparison) -> str:
     return (
         f"{a.contender.title} against {b.contender.title}: {comparison.verdict}. Its interquartile mean is "
         f"{ratio.value:.3g}{span(ratio.low, ratio.high)} times the other's, and it has the lower score on the same "
-        f"plant with probability {probability.value:.3g}{span(probability.low, probability.high)}."
+        f"plant with probability {probability.value:.3g}{span(probability.low, probability.high)} "
+        f"(failed: {of_a} against {of_b})."
     )
 
 
