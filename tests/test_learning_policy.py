@@ -7,6 +7,9 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
+import torch
+from safetensors.numpy import load_file
+from safetensors.torch import save as tensor_bytes
 from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
 
@@ -128,7 +131,18 @@ def test_bad_files_are_named(tmp_path):
     for change, message in [
         ({"layers": [6, 16, 9, 1]}, r"a\.safetensors: weights have shapes .* asks for"),
         ({"layers": [6, 8, 1]}, r"a\.safetensors: holds .* asks for"),
-        ({"units": [1.0, 1.0]}, r"a\.safetensors: layers=.* must lead from 2 inputs"),
+        ({"units": [1.0, 1.0]}, r"a\.safetensors: units=.* do not fit 'smo' of SMOPendulum-v0"),
+        ({"observation": "positions"}, r"a\.safetensors: units=.* do not fit 'positions' of SMOPendulum-v0"),
+        ({"units": [1.0] * 10}, r"a\.safetensors: units=.* do not fit 'smo'"),
+        (
+            {"units": [1.0] * 10, "environment": "SMOPendulumTracking-v0"},
+            r"a\.safetensors: layers=.* must lead from 10 inputs",
+        ),
+        ({"observation": "stacked", "units": [1.0] * 6}, r"a\.safetensors: frames=1 must be 4, of 'stacked'"),
+        ({"control_period": 0.0}, r"a\.json: is no card of a policy \(control_period: "),
+        ({"control_period": None}, r"a\.json: is no card of a policy \(control_period: "),
+        ({"configuration": {"options": None}}, r"a\.json: is no card .*its options must be mappings"),
+        ({"configuration": None}, r"a\.json: is no card .*its options must be mappings"),
         ({"observation": "smoo"}, r"did you mean 'smo'"),
         ({"frames": 0}, r"a\.json: is no card of a policy \(frames: "),
         ({"lstm": 3}, r"a\.safetensors: holds .* asks for"),
@@ -139,6 +153,40 @@ def test_bad_files_are_named(tmp_path):
     path.with_suffix(".json").write_text("{")
     with pytest.raises(ValueError, match=r"a\.json: is no card of a policy"):
         MlpPolicy.load(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("lstm.weight_hh", np.full((48, 12), np.nan), "weights must be finite"),
+        ("0.bias", np.full(8, np.inf), "weights must be finite"),
+        ("0.bias", np.zeros(8, dtype=np.int64), "holds weights of type int64, they must be floating point"),
+        ("0.bias", np.zeros(8, dtype=bool), "holds weights of type bool"),
+        ("0.bias", torch.zeros(8, dtype=torch.bfloat16), "that NumPy can hold .*BF16"),
+        ("0.bias", torch.zeros(8, dtype=torch.float8_e4m3fn), "that NumPy can hold .*F8_E4M3"),
+    ],
+)
+def test_weights_are_finite_numbers_of_floating_point(name, value, message, tmp_path):
+    path = tmp_path / "a.safetensors"
+    untrained("positions", "recurrent")[1].save(path)
+    tensors = {key: torch.from_numpy(tensor) for key, tensor in load_file(path).items()}
+    tensors[name] = torch.as_tensor(value)
+    path.write_bytes(tensor_bytes(tensors))
+    with pytest.raises(ValueError, match=r"a\.safetensors: .*" + message):
+        MlpPolicy.load(path)
+
+
+def test_the_control_period_is_that_of_training(tmp_path):
+    path = tmp_path / "a.safetensors"
+    _, policy = untrained(control_period=0.01)
+    policy.save(path)
+    card = json.loads(path.with_suffix(".json").read_text())
+    assert card.pop("control_period") == 0.01
+    path.with_suffix(".json").write_text(json.dumps(card))  # as the first cards were
+    assert MlpPolicy.load(path).control_period == 0.01
+    del card["configuration"]
+    path.with_suffix(".json").write_text(json.dumps(card))
+    assert MlpPolicy.load(path).control_period == 0.02
 
 
 def test_nothing_of_torch_is_needed():

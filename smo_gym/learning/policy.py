@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from safetensors import SafetensorError
 from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
@@ -18,7 +18,7 @@ from scipy.special import expit
 
 from ..envs.task import HANGING
 from ..evaluation import files
-from ..validation import choice, number
+from ..validation import choice
 from .observations import KINDS, scaled
 
 Array = NDArray[np.float64]
@@ -45,6 +45,8 @@ class Card(BaseModel):
     """Width of an LSTM in front of the layers."""
     force_limit: Positive
     """N; what an action of 1 stands for."""
+    control_period: Positive
+    """s; that of its training. Where a card does not have it, it is taken from the environment's options."""
 
     command: str = ""
     seed: int | None = None
@@ -56,6 +58,21 @@ class Card(BaseModel):
     measured: dict[str, float] = {}
     """This policy, the best of the curve, on plants that neither training nor those evaluations saw."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _period(cls, data: Any) -> Any:
+        configuration = data.get("configuration", {}) if isinstance(data, Mapping) else None
+        options = configuration.get("options", {}) if isinstance(configuration, Mapping) else None
+        if not isinstance(options, Mapping):
+            raise ValueError("configuration and its options must be mappings")
+        return {"control_period": options.get("control_period", HANGING.control_period), **data}
+
+    @property
+    def follows(self) -> bool:
+        """Whether its environment has a reference, which observations then tell."""
+        told = self.configuration.get("options", {}).get("reference")
+        return told is not None or self.environment == "SMOPendulumTracking-v0"
+
 
 @dataclass(frozen=True)
 class MlpPolicy:
@@ -65,7 +82,7 @@ class MlpPolicy:
     and does not look at it.
 
     Raises:
-        ValueError: an unknown kind of observation, or weights that do not fit the card.
+        ValueError: an unknown kind of observation, a card that contradicts it, or weights that do not fit the card.
     """
 
     card: Card
@@ -73,7 +90,13 @@ class MlpPolicy:
 
     def __post_init__(self) -> None:
         card = self.card
-        choice("observation", card.observation, KINDS)
+        kind = KINDS[choice("observation", card.observation, KINDS)]
+        if card.frames != kind.frames:
+            raise ValueError(f"frames={card.frames} must be {kind.frames}, of {card.observation!r}")
+        states, rest = divmod(len(card.units) - 2, 4)  # beside the positions
+        least = int(bool(kind.observer))
+        if rest or states < least or (states > least and not card.follows):
+            raise ValueError(f"units={card.units} do not fit {card.observation!r} of {card.environment}")
         wanted = list(zip(card.layers[1:], card.layers[:-1], strict=True))
         shapes = [(W.shape, b.shape) for W, b in self.layers]
         if shapes != [(shape, shape[:1]) for shape in wanted]:
@@ -87,8 +110,7 @@ class MlpPolicy:
     @property
     def control_period(self) -> float:
         """In s: that of its training."""
-        options = self.card.configuration.get("options", {})
-        return number("control_period", options.get("control_period", HANGING.control_period), above=0.0)
+        return self.card.control_period
 
     def predict(
         self,
@@ -163,13 +185,15 @@ class MlpPolicy:
             ) from None
         try:
             tensors = read_tensors(_read(path))
-        except SafetensorError as error:
-            raise ValueError(f"{path}: is corrupt or no safetensors file ({error})") from None
+        except (SafetensorError, KeyError) as error:  # KeyError: a type that NumPy lacks
+            raise ValueError(f"{path}: is corrupt or no safetensors file that NumPy can hold ({error})") from None
         count = len(card.layers) - 1
         names = {f"{k}.{part}" for k in range(count) for part in ("weight", "bias")}
         names |= set(LSTM) if card.lstm else set()
         if tensors.keys() != names:
             raise ValueError(f"{path}: holds {sorted(tensors)}, the card asks for {sorted(names)}")
+        if kinds := {str(tensor.dtype) for tensor in tensors.values() if tensor.dtype.kind != "f"}:
+            raise ValueError(f"{path}: holds weights of type {', '.join(sorted(kinds))}, they must be floating point")
         tensors = {name: tensor.astype(np.float64) for name, tensor in tensors.items()}
         layers = [(tensors[f"{k}.weight"], tensors[f"{k}.bias"]) for k in range(count)]
         try:
@@ -215,6 +239,8 @@ class LstmPolicy(MlpPolicy):
         wanted = [(4 * m, inputs), (4 * m, m), (4 * m,), (4 * m,)]
         if [part.shape for part in self.lstm] != wanted:
             raise ValueError(f"lstm has shapes {[part.shape for part in self.lstm]}, the card asks for {wanted}")
+        if not all(np.isfinite(part).all() for part in self.lstm):
+            raise ValueError("weights must be finite")
 
     def _remember(
         self, frame: Array, state: tuple[Array, ...] | None, episode_start: NDArray[np.bool_] | None
