@@ -218,7 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("evaluate.py: interrupted, nothing was written", file=sys.stderr)
         return 130
-    except ValueError as error:  # an agent's force that is not finite
+    except ValueError as error:  # an agent's force that is not finite, or its error
         print(f"evaluate.py: error: {error}; nothing was written", file=sys.stderr)
         return 2
     numbers = results(outcomes)

@@ -38,6 +38,13 @@ class Odd(Twin):
 class Wide(Twin):
     def predict(self, *arguments):
         return super().predict(*arguments)[0][:, 0], None
+class Fast(Twin):
+    control_period = "fast"
+class Timeless(Twin):
+    control_period = None
+class Late(Twin):
+    def predict(self, observation, state=None, *others):
+        return Twin.predict(self, observation)[0], 1 / (3 - (state or 0)) and (state or 0) + 1
 class Lost(Twin):
     def predict(self, observation, state=None, *others):
         return observation[:, :1] * (1.0 if state is None else float("nan")), ()
@@ -56,6 +63,7 @@ def here(tmp_path, monkeypatch):
     monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.delitem(sys.modules, "twins", raising=False)
     (tmp_path / "twins.py").write_text(TWIN)
+    (tmp_path / "leaves.py").write_text("raise SystemExit(3)\n")
     short = {"extends": str(ROOT / "configs" / "regulation.yaml")}
     short |= {"horizon": {"value": 1.0, "source": "chosen"}, "uncertainty": {"value": [0.2], "source": "chosen"}}
     (tmp_path / "short.yaml").write_text(yaml.safe_dump(short))
@@ -191,6 +199,10 @@ def test_training_and_tables_have_the_same_observer():
         ("twins:Needy", "cannot be made without arguments (TypeError:"),
         ("twins:Wide", "action has shape (2,), it must have shape (2, 1)"),
         ("twins:Odd", "control_period=0.0215 must be a whole multiple of the integration step dt=0.001"),
+        ("twins:Fast", "twins:Fast.control_period='fast' must be a finite number greater than 0"),
+        ("twins:Timeless", "twins:Timeless.control_period=None must be a finite number greater than 0"),
+        ("twins:Late", "twins:Late: cannot act at t = 0.003 s (ZeroDivisionError: division by zero); nothing was"),
+        ("leaves:Twin", "leaves:Twin: cannot import 'leaves' (SystemExit: 3)"),
         ("twins:Lost", "must be finite; nothing was written"),
         ("none.safetensors", "none.json: cannot be read"),
         ("cut.safetensors", "cut.safetensors: is corrupt"),

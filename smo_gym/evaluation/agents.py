@@ -77,7 +77,7 @@ def _own(name: str) -> Agent:
     module_name, _, attribute = name.partition(":")
     try:
         module = importlib.import_module(module_name)
-    except Exception as error:  # whatever a user's module may raise
+    except (Exception, SystemExit) as error:  # whatever a user's module may raise
         raise ValueError(f"{name}: cannot import {module_name!r} ({type(error).__name__}: {error})") from error
     made = getattr(module, attribute, None)
     if not callable(made):
@@ -85,7 +85,7 @@ def _own(name: str) -> Agent:
         raise ValueError(unknown(f"class in {module_name}", attribute, known))
     try:
         agent = made()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise ValueError(f"{name}: cannot be made without arguments ({type(error).__name__}: {error})") from error
     if not callable(getattr(agent, "predict", None)):
         raise ValueError(f"{name}: has no method predict(observation, state, episode_start, deterministic)")

@@ -33,6 +33,11 @@ class Agent(Protocol):
         ...
 
 
+def title(agent: Agent) -> str:
+    """An agent in messages, ``module:Class``."""
+    return f"{type(agent).__module__}:{type(agent).__qualname__}"
+
+
 @dataclass(frozen=True, slots=True)
 class Traces:
     """Some slots of a rollout at every so many control instants, the start included."""
@@ -90,7 +95,8 @@ def rollout(
         progress: called with the number of control periods done since the last call.
 
     Raises:
-        ValueError: the environment restarts slots by itself, or ``trace_every`` is no positive integer.
+        ValueError: the environment restarts slots by itself, ``trace_every`` is no positive integer, or the agent
+            raises an error, which is the cause of this one.
     """
     if env.metadata.get("autoreset_mode") is not AutoresetMode.DISABLED:
         raise ValueError("a rollout is one episode a slot: make the environment with autoreset_mode='Disabled'")
@@ -114,7 +120,11 @@ def rollout(
     failures = 0
     for k in range(1, task.steps + 1):
         seen = np.where(failed[:, None], 0.0, observation) if failures else observation
-        action, agent_state = agent.predict(seen, agent_state, first, True)
+        try:
+            action, agent_state = agent.predict(seen, agent_state, first, True)
+        except Exception as error:  # whatever a user's agent may raise
+            place = f"t = {(k - 1) * task.control_period:g} s"
+            raise ValueError(f"{title(agent)}: cannot act at {place} ({type(error).__name__}: {error})") from error
         first = later
         if failures:
             action = np.where(failed[:, None], 0.0, action)

@@ -18,10 +18,10 @@ from ..observers import Gains, SlidingModeObserver
 from ..plant import CartPendulum
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
 from ..theorem import OperatingSet, design, stable
-from ..validation import unknown
+from ..validation import number, unknown
 from ..wrappers import VectorObserverWrapper
 from . import agents
-from .rollout import Agent
+from .rollout import Agent, title
 
 T = TypeVar("T")
 Four = tuple[float, float, float, float]
@@ -215,8 +215,13 @@ class Scenario(_Strict):
         return settings.build(self.control_period.value)
 
     def period(self, agent: Agent) -> float:
-        """An agent's control period in s: its attribute ``control_period`` where it has one, else the scenario's."""
-        return float(getattr(agent, "control_period", self.control_period.value))
+        """An agent's control period in s: its attribute ``control_period`` where it has one, else the scenario's.
+
+        Raises:
+            ValueError: the attribute is no positive number.
+        """
+        value = getattr(agent, "control_period", self.control_period.value)
+        return number(f"{title(agent)}.control_period", value, above=0.0)
 
     def with_agent(self, name: str) -> Scenario:
         """The same with one controller more, on the estimates of LQR's observer (or the first controller's).
