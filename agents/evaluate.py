@@ -28,6 +28,7 @@ from smo_gym.validation import number, unknown
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
 OBSERVERS = ("smo", "theorem", "oracle")
+RESULTS = ("results.csv", "runs.csv", "tables.md", "tables.tex", "reference.json", "settings.yaml")
 COMPENSATION = {"on": ("with",), "off": ("without",), "both": ("without", "with")}
 
 
@@ -194,6 +195,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         groups = study.groups(scenarios, controllers, arms, args.runs)
         drawn, left_out = figures.planned(groups) if args.figures else ([], [])
         if args.report:
+            drawings = (f"figures/{plan.name}.{form}" for plan in drawn for form in figures.FORMATS)
+            if args.report.resolve() in ((args.out / name).resolve() for name in (*RESULTS, *drawings)):
+                raise ValueError(f"--report {args.report}: is one of the results in --out {args.out}")
             report.check(groups, args.report)
         out = files.prepare(args.out)
         pictures = files.prepare(out / "figures") if drawn else out

@@ -159,6 +159,11 @@ def test_what_cannot_be_reported_is_said_before_any_run(evaluate, tmp_path, caps
     assert "is a folder" in capsys.readouterr().err
     assert evaluate(*arguments, tmp_path / "short.yaml" / "report.html") == 2
     assert f"--report {tmp_path / 'short.yaml'}: cannot be written to" in capsys.readouterr().err
+    for own in ("results.csv", "new/../settings.yaml", "figures/figure-03-states-lqr.pdf"):
+        path = tmp_path / "out" / own
+        assert evaluate(*arguments, path, "--figures") == 2
+        assert f"--report {path}: is one of the results in --out {tmp_path / 'out'}" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
     monkeypatch.setitem(sys.modules, "plotly", None)
     assert evaluate(*arguments, tmp_path / "report.html") == 2
     assert 'a report needs plotly: pip install "smo_gym[report]"' in capsys.readouterr().err
