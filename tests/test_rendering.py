@@ -108,10 +108,18 @@ def test_the_force_is_an_arrow():
     for force in (30.0, -15.0):
         frame, env = frame_of(force=force)
         _, columns = pixels(frame, rendering.FORCE)
-        assert np.ptp(columns) == pytest.approx(abs(force) / 30 * WIDTH / 4, rel=0.05)  # two rods at the limit
+        assert np.ptp(columns) == pytest.approx(abs(force) / 30 * 1.5 * WIDTH / 8, rel=0.05)  # of eight rods
         cart = WIDTH / 2 + WIDTH / (8 * 0.44) * env._x[0, 0]
         assert (columns > cart).all() if force > 0 else (columns < cart).all()
     assert not pixels(frame_of(force=0.0)[0], rendering.FORCE)[0].size
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_the_whole_arrow_is_in_sight_at_the_edge_of_the_middle_half(side):
+    frame, _ = frame_of(state=(side * 2.5, 0, 0, 0), force=side * 30.0)
+    _, columns = pixels(frame, rendering.FORCE)
+    assert np.ptp(columns) == pytest.approx(1.5 * WIDTH / 8, rel=0.05)
+    assert 5 < columns.min() < columns.max() < WIDTH - 5
 
 
 def test_the_estimate_is_a_ghost_only_where_there_is_one():

@@ -96,7 +96,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
     ## Rendering
 
     With the extra `render` (pygame-ce). Cart, rod and bob as they are, of this episode's rod length; the force as an
-    arrow, two rods long at the limit (at 30 N without one); the reference in green; and under
+    arrow, one and a half rods long at the limit (at 30 N without one); the reference in green; and under
     :class:`smo_gym.ObserverWrapper` the estimate as a ghost in blue. The frame goes along with a cart that leaves its
     middle. `metadata["render_fps"]` is that of real time, one frame a control period.
 
