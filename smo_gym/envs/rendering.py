@@ -225,8 +225,7 @@ class Renderer:
         pg.draw.circle(canvas, colour, end, 1.4 * u, round(0.35 * u))
 
     def _arrow(self, canvas: pygame.Surface, scene: Scene) -> None:
-        """The force on the cart: one and a half rods for the largest (30 N where there is no limit), so that the tip
-        stays in sight."""
+        """The force on the cart: 1.5 rods, always in sight, for the largest (30 N where there is no limit)."""
         pg, u = self._pygame, self._unit
         largest = self._task.force_limit if math.isfinite(self._task.force_limit) else 30.0
         length = 15 * u * min(abs(scene.force) / largest, 1.0)
