@@ -45,7 +45,7 @@ class Card(BaseModel):
     """Width of an LSTM in front of the layers."""
     force_limit: Positive
     """N; what an action of 1 stands for."""
-    control_period: Positive
+    control_period: Positive = HANGING.control_period
     """s; that of its training. Where a card does not have it, it is taken from the environment's options."""
 
     command: str = ""
