@@ -7,6 +7,7 @@ import runpy
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -163,3 +164,9 @@ def test_relative_links_lead_somewhere():
     for page in DOCS.rglob("*.md"):
         for target in re.findall(r"\]\(([^)\s#]+?)(?:#[^)\s]*)?\)", page.read_text(encoding="utf-8")):
             assert target.startswith("https://") or (page.parent / target).exists(), f"{page}: {target}"
+
+
+def test_every_licence_goes_with_the_package():
+    globs = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["license-files"]
+    named = {path.relative_to(ROOT) for glob in globs for path in ROOT.glob(glob)}
+    assert named == {Path("LICENSE"), Path("docs/fonts/LICENSE.txt")}
