@@ -137,11 +137,11 @@ def _bars(cells: Sequence[Result]) -> Figure:
             if any(math.isfinite(r.published) for r in chosen):
                 hatched = {"color": COLOURS[arm], "pattern": {"shape": "/", "fillmode": "replace", "size": 5}}
                 hatched["line"] = {"color": COLOURS[arm], "width": 1}
-                values = [_plain(r.published) for r in chosen]
+                values = [short(r.published) for r in chosen]
                 figure.add_trace(Bar(y=values, name=f"{arm}, published", marker=hatched, **look), row, 1)
             if chosen:
                 span = _interval(chosen) | {"thickness": 1.2, "width": 2, "color": "#888888"}
-                values = [_plain(r.measured) for r in chosen]
+                values = [short(r.measured) for r in chosen]
                 figure.add_trace(
                     Bar(y=values, error_y=span, name=f"{arm}, measured", marker={"color": COLOURS[arm]}, **look), row, 1
                 )
@@ -157,13 +157,14 @@ def _interval(cells: Sequence[Result]) -> dict[str, Any]:
     return {
         "type": "data",
         "symmetric": False,
-        "array": [_plain(r.ci_high - r.measured) for r in cells],
-        "arrayminus": [_plain(r.measured - r.ci_low) for r in cells],
+        "array": [short(r.ci_high - r.measured) for r in cells],
+        "arrayminus": [short(r.measured - r.ci_low) for r in cells],
     }
 
 
-def _plain(value: float) -> float | None:
-    return float(f"{value:.5g}") if math.isfinite(value) else None
+def short(value: float) -> float | None:
+    """Four digits, as many as the page shows; None for no number."""
+    return float(f"{value:.4g}") if math.isfinite(value) else None
 
 
 def _quiet(figure: Figure, height: int, **layout: Any) -> Figure:

@@ -138,12 +138,8 @@ def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
         "failed": outcome.failed[shown].tolist(),
         "duration": [round(float(value), 6) for value in metrics["duration"][shown]],
         "plants": [[float(f"{value:.4g}") for value in plant] for plant in outcome.plants[shown]],
-        **{name: [_short(value) for value in metrics[name][shown]] for name in ("mse_h", "mse_theta")},
+        **{name: [charts.short(value) for value in metrics[name][shown]] for name in ("mse_h", "mse_theta")},
     }
-
-
-def _short(value: float) -> float | None:
-    return float(f"{value:.4g}") if math.isfinite(value) else None
 
 
 def _tables(outcomes: Sequence[Outcome], results: Iterable[Result]) -> list[dict[str, Any]]:
