@@ -181,14 +181,14 @@ class Watch(BaseCallback):
         self._progress(self.num_timesteps, found)
 
     def _restart(self) -> None:
-        seed = seeds(TRAINING, 1, self._run.seed, self.num_timesteps)[0]
+        seed, n = seeds(TRAINING, 1, self._run.seed, self.num_timesteps)[0], self._run.n_envs
         self.model.set_random_seed(seed)
-        self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
         # the first episodes end at random times: else all slots would go through their episodes in step, and every
         # update would see one phase of them alone
-        left, task = (self.training_env.get_attr(name, 0)[0] for name in ("_steps_left", "task"))
-        left[:] = np.random.default_rng(seed).integers(1, task.steps, len(left), endpoint=True)
-        self.model._last_episode_starts = np.ones(self._run.n_envs, dtype=np.bool_)
+        most = self.training_env.get_attr("task", 0)[0].steps
+        self.training_env.set_options({"steps": np.random.default_rng(seed).integers(1, most, n, endpoint=True)})
+        self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
+        self.model._last_episode_starts = np.ones(n, dtype=np.bool_)
 
     def _on_step(self) -> bool:
         return True
