@@ -111,7 +111,7 @@ def test_one_episode_may_be_cut_before_the_horizon(make_vec, env_id, mode):
     asked = np.array([2, 5, 3])
     a, b = cut.reset(seed=0, options={"steps": asked})[0], whole.reset(seed=0)[0]
     assert np.array_equal(a, b)
-    ends, age = [[], [], []], np.zeros(3, dtype=int)
+    ends = [[], [], []]
     for k in range(1, 14):
         a, _, terminated, truncated, info = cut.step(np.full((3, 1), 0.1))
         b, *_, other = whole.step(np.full((3, 1), 0.1))
@@ -132,7 +132,7 @@ def test_one_episode_may_be_cut_before_the_horizon(make_vec, env_id, mode):
 
 def test_where_an_episode_may_be_cut(make_vec):
     env = make_vec(3, horizon=0.1)
-    _, info = env.reset(seed=0, options={"steps": 1})
+    env.reset(seed=0, options={"steps": 1})
     assert env.step(np.zeros((3, 1)))[3].all()
     env.reset(options={"steps": np.array([1, 5, 1]), "reset_mask": np.array([False, True, True])})
     assert env.step(np.zeros((3, 1)))[3].tolist() == [False, False, True]
