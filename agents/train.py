@@ -50,13 +50,13 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Train; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
-    args = parse(arguments)
+    args, out = parse(arguments), None
     try:
-        from smo_gym.learning import training
+        from smo_gym.learning import settings, training
 
         if args.seed < 0 or (args.steps is not None and args.steps < 1):
             raise ValueError(f"--seed {args.seed} must be at least 0 and --steps {args.steps} at least 1")
-        run = training.load(args.config, args.env, args.algo, args.observation, args.seed, args.steps, args.uncertainty)
+        run = settings.load(args.config, args.env, args.algo, args.observation, args.seed, args.steps, args.uncertainty)
         name = f"{run.environment}-{run.observation}-{run.algorithm}-{run.seed}"
         out = files.prepare(args.out or Path("runs") / name)
         with tqdm(total=run.steps, unit="step", unit_scale=True, desc="learning", disable=None) as bar:
@@ -70,7 +70,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"train.py: error: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"train.py: interrupted; the same command resumes from the last checkpoint in {out}", file=sys.stderr)
+        where = f"; the same command resumes from the last checkpoint in {out}" if out else " before it began"
+        print(f"train.py: interrupted{where}", file=sys.stderr)
         return 130
     given = list(sys.argv[1:] if arguments is None else arguments)
     command = shlex.join(["python", "agents/train.py", *given])

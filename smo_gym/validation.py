@@ -42,7 +42,9 @@ def mapping(what: str, value: Any, known: Iterable[str]) -> dict[str, Any]:
         ValueError: it is not a mapping, or a key is unknown, with a suggestion.
     """
     if not isinstance(value, Mapping):
-        raise ValueError(f"{what}: {value!r} must be a mapping with the keys {', '.join(map(repr, sorted(known)))}")
+        raise ValueError(
+            f"{what}: {value!r} must be a mapping with the keys {', '.join(map(repr, sorted(map(str, known))))}"
+        )
     for name in value:
         choice(what, name, known)
     return dict(value)
@@ -79,7 +81,7 @@ def multiple(name: str, value: Any, of_name: str, of: float) -> int:
 
 def unknown(what: str, name: object, known: Iterable[str]) -> str:
     """The message for a name that nothing answers to, with the nearest name that exists."""
-    known = sorted(known)
+    known = sorted(map(str, known))  # a file's keys may be numbers
     lower = {word.lower(): word for word in known}
     near = difflib.get_close_matches(str(name).lower(), lower, n=1, cutoff=0.5)
     hint = f"did you mean {lower[near[0]]!r}? " if near else ""

@@ -56,7 +56,13 @@ def _named(observer: Any, compensation: bool | None, settings: dict[str, Any]) -
     return {"observer": observer, "compensation": compensation, **settings}
 
 
-def _task(env: Any) -> Task:
+def task_of(env: Any) -> Task:
+    """The task of an environment, scalar or vector, that observes what its task tells and no more.
+
+    Raises:
+        TypeError: the environment is not one of this package.
+        ValueError: its slots have different tasks, or something has changed what it observes.
+    """
     base = env.unwrapped
     batch = isinstance(base, SyncVectorEnv | AsyncVectorEnv)
     try:
@@ -64,12 +70,12 @@ def _task(env: Any) -> Task:
     except AttributeError:
         task, others = None, []
     if not isinstance(task, Task):
-        raise TypeError(f"{env} is not a smo_gym environment: an observer needs its sampling period and its samples")
+        raise TypeError(f"{env} is not a smo_gym environment: an observer needs its sampling period and samples")
     if any(other != task for other in others):
-        raise ValueError(f"{env} has environments with different options: one observer serves alike ones")
+        raise ValueError(f"{env} has environments with different options: one wrapper serves alike ones")
     space = env.single_observation_space if isinstance(env, VectorEnv) else env.observation_space
     if space.shape != task.observation_space.shape:
-        raise ValueError(f"{env} observes {space}: an observer must stand inside whatever else changes that")
+        raise ValueError(f"{env} observes {space}: an observer or view must stand inside whatever else changes that")
     return task
 
 
@@ -118,7 +124,7 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
     ) -> None:
         RecordConstructorArgs.__init__(self, **_named(observer, compensation, settings))
         gymnasium.Wrapper.__init__(self, env)
-        task = _task(env)
+        task = task_of(env)
         self.observer = make_observer(observer, compensation, settings)
         self._estimator = self.observer.start(1, task.dt, _force(task), task.params)
         self._show = cast(PendulumEnv, env.unwrapped).show
@@ -171,7 +177,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
     ) -> None:
         RecordConstructorArgs.__init__(self, **_named(observer, compensation, settings))
         VectorWrapper.__init__(self, env)
-        task = _task(env)
+        task = task_of(env)
         n, plant = env.num_envs, (task.dt, _force(task), task.params)
         if isinstance(observer, Sequence) and not isinstance(observer, str):
             if settings or compensation is not None:

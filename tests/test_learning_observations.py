@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from smo_gym.learning.observations import KINDS, LIMIT, UNITS, VectorAgentView, agent_view, scaled, units
-from smo_gym.wrappers import ObserverWrapper
+from smo_gym.wrappers import ObserverWrapper, VectorObserverWrapper
 
 
 def act(k):
@@ -86,3 +86,17 @@ def test_bad_input(make_vec):
         agent_view(gymnasium.make("SMOPendulum-v0", force_limit=None))
     with pytest.raises(ValueError, match="force_limit=None"):
         VectorAgentView(make_vec(2, force_limit=None))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("env_id", ["SMOPendulum-v0", "SMOPendulumTracking-v0"])
+def test_a_view_stands_next_to_the_plant(kind, env_id, make_vec):
+    """With an observer inside it, 'positions' would be no positions alone."""
+    with pytest.raises(ValueError, match="an observer or view must stand inside"):
+        agent_view(ObserverWrapper(gymnasium.make(env_id)), kind)
+    with pytest.raises(ValueError, match="an observer or view must stand inside"):
+        VectorAgentView(VectorObserverWrapper(make_vec(2, env_id)), kind)
+    with pytest.raises(TypeError, match="is not a smo_gym environment"):
+        agent_view(gymnasium.make("Pendulum-v1"), kind)
+    with pytest.raises(TypeError, match="is not a smo_gym environment"):
+        VectorAgentView(gymnasium.make_vec("Pendulum-v1"), kind)

@@ -17,7 +17,8 @@ from smo_gym import ObserverWrapper
 from smo_gym.learning import MlpPolicy
 from smo_gym.learning.observations import KINDS, agent_view
 from smo_gym.learning.policy import Card
-from smo_gym.learning.training import Run, built, frozen
+from smo_gym.learning.settings import Run, built
+from smo_gym.learning.training import frozen
 
 SMALL = {
     "policy": "MlpPolicy",

@@ -88,6 +88,14 @@ def test_seeds_and_options_hold_for_one_reset(make):
     assert np.array_equal(env.reset()[:, :2], np.tile(np.float32([0.5, 0.25]), (3, 1)))
     env.set_options([{"state": [0.1 * i, 0.0, 0.0, 0.0]} for i in range(3)])
     assert np.allclose(env.reset()[:, 0], [0.0, 0.1, 0.2])
+    plant = {"cart_mass": 3.0}
+    env.set_options({"params": plant})
+    env.reset()
+    assert env.vector_info["params"][:, 0].tolist() == [3.0] * 3
+    env.set_options([{"params": plant, "steps": 1 + i} for i in range(3)])
+    env.reset()
+    ended = np.stack([env.step(np.zeros((3, 1), dtype=np.float32))[2] for _ in range(3)])
+    assert np.array_equal(ended, np.eye(3, dtype=bool))
     env.set_options([{"state": [0.0] * 4}, {}, {}])
     with pytest.raises(ValueError, match="every slot"):
         env.reset()
@@ -102,12 +110,15 @@ def test_attributes_and_methods(make):
     assert generators == [env.env.unwrapped.np_random[1]]
     env.set_attr("metadata", {"a": 1})
     assert env.get_attr("metadata") == [{"a": 1}] * 3
-    with pytest.raises(ValueError, match="set all"):
-        env.set_attr("metadata", {}, indices=[1])
+    for indices in ([1], [5], 0):
+        with pytest.raises(ValueError, match=r"set_attr\('metadata', indices=.*name all 3 or none"):
+            env.set_attr("metadata", {}, indices=indices)
+        with pytest.raises(ValueError, match=r"env_method\('reset', indices=.*name all 3 or none"):
+            env.env_method("reset", indices=indices)
     with pytest.raises(AttributeError):
         env.get_attr("nothing")
     assert not env.has_attr("nothing")
-    assert env.env_method("reset", indices=[0])[0][0].shape == (3, 6)
+    assert [result[0].shape for result in env.env_method("reset", indices=[2, 0, 1])] == [(3, 6)] * 3
     assert env.env_is_wrapped(VectorObserverWrapper, [0, 1]) == [True, True]
     assert env.env_is_wrapped(gymnasium.Wrapper) == [False] * 3
     assert is_vecenv_wrapped(VecMonitor(env), VecMonitor)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from smo_gym.learning import MlpPolicy, measurement, training
+from smo_gym.evaluation import scenario
+from smo_gym.learning import MlpPolicy, measurement, settings, training
 
 ROOT = Path(__file__).resolve().parent.parent
 CONFIGS = ROOT / "configs"
@@ -87,16 +88,55 @@ def test_a_damaged_checkpoint_is_named(command, tmp_path, capsys):
     assert "checkpoint.zip: cannot be read" in capsys.readouterr().err
 
 
+def test_a_checkpoint_without_its_settings_is_of_nobody_knows_what(command, tmp_path, capsys):
+    assert command("--steps", "32") == 0
+    run = tmp_path / "run/run.json"
+    for text in ("[]", "{", None):
+        run.write_text(text) if text else run.unlink()
+        assert command("--steps", "32", "--seed", "3") == 2
+        assert "run.json: cannot be read" in capsys.readouterr().err
+    assert not run.exists()
+
+
+def test_an_interruption_before_anything_is_there(monkeypatch, capsys):
+    def interrupt(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(settings, "load", interrupt)
+    assert train.main([]) == 130
+    assert "interrupted before it began" in capsys.readouterr().err
+
+
+def test_what_cannot_be_frozen_is_not_trained(tmp_path):
+    plain = settings.load(CONFIGS / "ppo.yaml", "SMOPendulum-v0", "ppo", steps=32)
+    recurrent = settings.load(CONFIGS / "ppo_lstm.yaml", "SMOPendulum-v0", "recurrent", steps=32)
+    squashed = {"use_sde": True, "policy_kwargs": {"squash_output": True}}
+    for run, change, message in [
+        (plain, squashed, "squash_output=True"),
+        (recurrent, {"policy_kwargs": {"n_lstm_layers": 2}}, "lstm has 2 layers"),
+    ]:
+        small = {"n_steps": 8, "batch_size": 16, **change}
+        with pytest.raises(ValueError, match=message):
+            training.train(training.replace(run, n_envs=4, hyperparameters=run.hyperparameters | small), tmp_path)
+        assert not list(tmp_path.iterdir())
+
+
 def test_streams_of_seeds_share_nothing():
-    learned = {seed for steps in range(0, 320, 32) for seed in measurement.seeds(measurement.TRAINING, 4, 0, steps)}
-    others = [set(measurement.seeds(stream, 4)) for stream in (measurement.VALIDATION, measurement.TEST)]
-    assert len(learned) == 40
-    assert not learned & others[0]
-    assert not others[0] & others[1]
+    """Slot i of a batch seeded with s has s + i: not the first seeds alone, all of the slots' must differ."""
+    slots = {"training": [], "others": []}
+    for seed in range(5):
+        for steps in range(0, 2_000_000, 98_304):
+            first = measurement.seeds(measurement.TRAINING, 1, seed, steps)[0]
+            slots["training"] += range(first, first + 256)
+    for stream in (measurement.VALIDATION, measurement.TEST):
+        first = measurement.seeds(stream, 1)[0]
+        slots["others"] += range(first, first + 100)
+    everything = slots["training"] + slots["others"]
+    assert len(set(everything)) == len(everything) == 5 * 21 * 256 + 200
 
 
 def test_the_recurrent_algorithm_learns_and_is_exported(tmp_path, monkeypatch):
-    run = training.load(CONFIGS / "ppo_lstm.yaml", "SMOPendulum-v0", "recurrent", steps=32)
+    run = settings.load(CONFIGS / "ppo_lstm.yaml", "SMOPendulum-v0", "recurrent", steps=32)
     small = training.replace(
         run, n_envs=4, hyperparameters=run.hyperparameters | {"n_steps": 8, "batch_size": 16, "n_epochs": 1}
     )
@@ -128,25 +168,73 @@ def test_bad_arguments(arguments, message, tmp_path, capsys):
     ("change", "message"),
     [
         ({"learning_rat": 1e-3}, "unknown hyperparameter 'learning_rat': did you mean 'learning_rate'"),
+        ({"device": "cpu"}, "unknown hyperparameter 'device'"),
+        ({"tensorboard_log": "x"}, "unknown hyperparameter 'tensorboard_log'"),
+        ({1: 2}, "unknown hyperparameter 1"),
         ({"env_wrapper": ["a.b"]}, "env_wrapper="),
+        ({"env_wrapper": [3]}, "env_wrapper=[3] must be a list of"),
+        ({"env_wrapper": [{settings.VIEW: None}]}, "argument of agent_view: None must be a mapping"),
+        ({"env_wrapper": [{settings.VIEW: {"observatio": "smo"}}]}, "did you mean 'observation'"),
         ({"env_kwargs": {"horizn": 1.0}}, "did you mean 'horizon'"),
+        ({"env_kwargs": None}, "env_kwargs=None must be a mapping"),
+        ({"n_envs": 2.7}, "n_envs=2.7 must be a whole number"),
+        ({"n_envs": True}, "n_envs=True must be a whole number"),
+        ({"n_timesteps": 2.5}, "n_timesteps=2.5 must be a whole number"),
         ({"n_steps": "many"}, "n_steps='many' must be"),
+        ({"batch_size": "x"}, "batch_size='x' must be a whole number"),
+        ({"batch_size": 0}, "batch_size=0 must be a whole number"),
+        ({"batch_size": 1}, "hyperparameters: AssertionError"),
+        ({"policy": "MlpPolic"}, "hyperparameters: ValueError"),
+        ({"policy_kwargs": "dict(net_arch=[64])"}, "policy_kwargs='dict(net_arch=[64])' must be a mapping"),
+        ({"policy_kwargs": {"net_arc": [64]}}, "hyperparameters: TypeError"),
+        ({"gamma": 7}, "gamma=7 must be a number from 0 to 1"),
+        ({"gamma": "x"}, "gamma='x' must be a number"),
+        ({"gamma": None}, "gamma=None must be a number"),
+        ({"learning_rate": float("nan")}, "learning_rate=nan must be"),
+        ({"learning_rate": "lin_nan"}, "learning_rate='lin_nan' must be"),
         ({"learning_rate": "lin_fast"}, "learning_rate='lin_fast' must be"),
     ],
 )
 def test_bad_settings(change, message, tmp_path, capsys):
     data = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
-    data["SMOPendulum-v0"] |= change
+    data["SMOPendulum-v0"] |= {"n_envs": 4, "batch_size": 64} | change
     (tmp_path / "bad.yaml").write_text(yaml.safe_dump(data))
     assert train.main(["--config", str(tmp_path / "bad.yaml"), "--out", str(tmp_path / "run")]) == 2
-    assert message in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert error.startswith("train.py: error: ")
+    assert message in error
+    assert not (tmp_path / "run").exists()
+
+
+def test_what_the_zoo_takes_is_taken(tmp_path):
+    data = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
+    data["SMOPendulum-v0"] |= {"n_timesteps": 1e3, "target_kl": None, "clip_range": "lin_0.2"}
+    data["SMOPendulum-v0"]["env_wrapper"] = [{settings.VIEW: {}}]
+    (tmp_path / "zoo.yaml").write_text(yaml.safe_dump(data))
+    run = settings.load(tmp_path / "zoo.yaml", "SMOPendulum-v0", "ppo")
+    assert (run.steps, run.observation) == (1000, "smo")
+
+
+def test_files_that_are_no_settings(tmp_path, capsys):
+    path = tmp_path / "a.yaml"
+    for content, message in [
+        (b"\xff\xfe\x00", "is not YAML ('utf-8' codec"),
+        (b"a: [", "is not YAML ("),
+        (b"1: {}", "unknown environment 'SMOPendulum-v0': known are '1'"),
+        (b"3", "must be a mapping"),
+    ]:
+        path.write_bytes(content)
+        assert train.main(["--config", str(path)]) == 2
+        assert f"train.py: error: {path}: {message}" in capsys.readouterr().err
+        with pytest.raises(ValueError, match="a.yaml: "):
+            scenario.load(path)
 
 
 def test_a_missing_extra_is_named(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "stable_baselines3", None)
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
-    for name in ("training", "sb3"):
+    for name in ("training", "settings", "sb3"):
         monkeypatch.delitem(sys.modules, f"smo_gym.learning.{name}", raising=False)
-    monkeypatch.delattr("smo_gym.learning.training")
+        monkeypatch.delattr(f"smo_gym.learning.{name}")
     assert train.main([]) == 2
     assert 'pip install "smo_gym[rl]"' in capsys.readouterr().err

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..validation import unknown
+from ..validation import mapping
 from .desired import Desired
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .task import Stepper, Task, applied_force
@@ -70,7 +70,8 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self._seeds: list[int] = []
         self._x = np.zeros((4, num_envs))
         self._params = np.repeat(self.task.params.as_array()[:, None], num_envs, axis=1)
-        self._steps_left = np.zeros(num_envs, dtype=np.int64)
+        self._k = np.zeros(num_envs, dtype=np.int64)  # the control instant that each slot is at
+        self._cut = np.full(num_envs, self.task.steps)  # and the one that ends its episode
         self._terminated = np.zeros(num_envs, dtype=np.bool_)
         self._truncated = np.zeros(num_envs, dtype=np.bool_)
         self._everywhere = np.ones(num_envs, dtype=np.bool_)
@@ -96,18 +97,19 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
 
         Args:
             seed: an integer s seeds slot i with s + i; a sequence gives each slot its own.
-            options: ``state`` (4,) or (n, 4), ``params`` (4,), (n, 4) or a mapping, ``reset_mask`` (n,) of bool.
+            options: ``state`` (4,) or (n, 4), ``params`` (4,), (n, 4) or a mapping, ``reset_mask`` (n,) of bool,
+                ``steps``, whole numbers () or (n,): the control periods after which this one episode is truncated,
+                at most those of the horizon, so that slots need not end together. Later episodes have the horizon.
         """
-        options = dict(options or {})
-        for name in options:
-            if name not in (*RESET_OPTIONS, "reset_mask"):
-                raise ValueError(unknown("reset option", name, (*RESET_OPTIONS, "reset_mask")))
+        options = mapping("reset option", options or {}, (*RESET_OPTIONS, "reset_mask", "steps"))
         mask = self._mask(options.pop("reset_mask", self._everywhere))
         if not self._generators and not mask.all():
             raise ResetNeeded("no episode has begun: the first reset() must be of all slots")
+        cut = self._instants(options.pop("steps", self.task.steps))
         each = self._each(options)
         self._seed(seed, mask)
         self._start(mask, each)
+        self._cut[mask] = cut[mask]
         return self._observation(), self._info(self._still(), np.zeros(self.num_envs))
 
     def step(self, actions: Array) -> tuple[Array, Array, Flags, Flags, dict[str, Any]]:  # type: ignore[override]
@@ -120,10 +122,10 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         if waiting:
             held = self._x[:, over]
             u[over] = 0.0
-        self._steps_left[~over] -= 1
-        x_d = self._rest if self._desired is None else self._desired.states[self._k()]
+        self._k[~over] += 1
+        x_d = self._rest if self._desired is None else self._desired.states[self._k]
         samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
-        terminated, truncated = failed, (self._steps_left == 0) & ~failed
+        terminated, truncated = failed, (self._k == self._cut) & ~failed
         if waiting:
             reward[over] = 0.0
             if self.autoreset_mode is AutoresetMode.DISABLED:
@@ -166,6 +168,14 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             raise ValueError("options['reset_mask'] must mark at least one slot")
         return mask
 
+    def _instants(self, steps: Any) -> NDArray[np.int64]:
+        given, most = np.asarray(steps), self.task.steps
+        if given.dtype.kind not in "iu" or given.shape not in ((), (self.num_envs,)):
+            raise ValueError(f"options['steps']={steps!r} must be a whole number or an array of {self.num_envs}")
+        if given.min() < 1 or given.max() > most:
+            raise ValueError(f"options['steps']={steps!r} must be from 1 to {most}, the control periods of the horizon")
+        return np.broadcast_to(given, self.num_envs).astype(np.int64)
+
     def _seed(self, seed: int | Sequence[int | None] | None, mask: Flags) -> None:
         n = self.num_envs
         seeds = [seed + i for i in range(n)] if isinstance(seed, int) else [None] * n if seed is None else list(seed)
@@ -184,7 +194,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             self._params[:, i], self._x[:, i] = params, x
         self._params_told = self._params.T.copy()
         self._params_told.flags.writeable = False  # infos share it
-        self._steps_left[mask] = self._stepper.steps
+        self._k[mask], self._cut[mask] = 0, self.task.steps
         self._terminated[mask] = self._truncated[mask] = False
 
     def _each(self, options: dict[str, Any]) -> list[dict[str, Any]]:
@@ -202,15 +212,11 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
     def _observation(self) -> Array:
         if self._desired is None:
             return self._x[:2].T.copy()
-        told = self._desired.told[self._k()]
+        told = self._desired.told[self._k]
         observation = np.empty((self.num_envs, 2 + told.shape[1]))
         observation[:, :2] = self._x[:2].T
         observation[:, 2:] = told
         return observation
-
-    def _k(self) -> NDArray[np.int64]:
-        """The control instant that each slot is at; a slot that is held stays at its last."""
-        return self._stepper.steps - self._steps_left
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
         everywhere = self._everywhere
@@ -225,7 +231,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             "_samples": everywhere,
         }
         if self._desired is not None:
-            info |= {"desired": self._desired.positions[self._k()], "_desired": everywhere}
+            info |= {"desired": self._desired.positions[self._k], "_desired": everywhere}
         return info
 
 

@@ -1,8 +1,25 @@
-"""Results on disk: noticed early where they cannot go, and never half written."""
+"""Files: settings read, results written; what cannot be is named early, and nothing is left half written."""
 
 import os
 import tempfile
 from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+def read_yaml(path: Path) -> Any:
+    """What a YAML file holds.
+
+    Raises:
+        ValueError: it cannot be read or is not YAML; the file is named.
+    """
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, ValueError) as error:  # a ValueError is of bytes that are no text, or of no date
+        raise ValueError(f"{path}: is not YAML ({' '.join(str(error).split())})") from None
 
 
 def prepare(folder: Path, option: str = "--out") -> Path:

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
 import gymnasium
 import numpy as np
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..controllers import LQR, SlidingModeController
@@ -20,7 +19,7 @@ from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
 from ..theorem import OperatingSet, design, stable
 from ..validation import number, unknown
 from ..wrappers import VectorObserverWrapper
-from . import agents
+from . import agents, files
 from .rollout import Agent, title
 
 T = TypeVar("T")
@@ -308,12 +307,7 @@ def _try_controller(scenario: Scenario, name: str) -> None:
 def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     if path.resolve() in above:
         raise ValueError(f"{path}: extends itself")
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: is not YAML ({' '.join(str(error).split())})") from None
+    data = files.read_yaml(path)
     if not isinstance(data, dict):
         raise ValueError(f"{path}: must be a mapping of settings")
     base = data.pop("extends", None)

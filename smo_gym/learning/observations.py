@@ -21,7 +21,7 @@ from gymnasium.wrappers import FlattenObservation, FrameStackObservation
 from numpy.typing import NDArray
 
 from ..validation import choice
-from ..wrappers import ObserverWrapper, VectorObserverWrapper
+from ..wrappers import ObserverWrapper, VectorObserverWrapper, task_of
 
 Array = NDArray[np.float64]
 Single = NDArray[np.float32]
@@ -82,9 +82,12 @@ def agent_view(env: gymnasium.Env[Array, Array], observation: str = "smo") -> gy
         observation: one of :data:`KINDS`.
 
     Raises:
-        ValueError: an unknown kind, or an environment without a force limit.
+        TypeError: the environment is not one of this package.
+        ValueError: an unknown kind, an environment without a force limit, or one that has an observer already or
+            whose observation is otherwise changed.
     """
     kind = KINDS[choice("observation", observation, KINDS)]
+    task_of(env)
     view: gymnasium.Env[Any, Any] = ScaleWrapper(ObserverWrapper(env, **kind.observer) if kind.observer else env)
     if kind.frames == 1:
         return view
@@ -125,11 +128,13 @@ class VectorAgentView(VectorWrapper[Single, Array, Array, Array, Array]):
     """The vector twin of :func:`agent_view`, in all three autoreset modes.
 
     Raises:
-        ValueError: an unknown kind, or an environment without a force limit.
+        TypeError: as :func:`agent_view`.
+        ValueError: as :func:`agent_view`.
     """
 
     def __init__(self, env: VectorEnv[Array, Array, Array], observation: str = "smo") -> None:
         self.kind = KINDS[choice("observation", observation, KINDS)]
+        task_of(env)
         self._force = _bounded(env.single_action_space)
         super().__init__(VectorObserverWrapper(env, **self.kind.observer) if self.kind.observer else env)
         self._units = units(self.env.single_observation_space.shape[0])  # type: ignore[index]

@@ -76,21 +76,28 @@ class SB3VecEnv(VecEnv):
         Raises:
             ValueError: only some slots are asked for.
         """
-        if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
-            raise ValueError(f"set_attr({attr_name!r}, indices={indices}): one batch shares its attributes, set all")
+        self._all(f"set_attr({attr_name!r}", indices)
         setattr(self._owner(attr_name), attr_name, value)
 
     def env_method(
         self, method_name: str, *method_args: Any, indices: int | Iterable[int] | None = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method once, on the batch; what it returns stands for each slot asked for."""
-        result = getattr(self._owner(method_name), method_name)(*method_args, **method_kwargs)
-        return [result for _ in self._get_indices(indices)]
+        """Call a method once, on the batch; what it returns stands for each slot.
+
+        Raises:
+            ValueError: only some slots are asked for.
+        """
+        self._all(f"env_method({method_name!r}", indices)
+        return [getattr(self._owner(method_name), method_name)(*method_args, **method_kwargs)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: type[Any], indices: int | Iterable[int] | None = None) -> list[bool]:
         """Whether a wrapper of that class is around the batch, for each slot asked for."""
         wrapped = any(isinstance(layer, wrapper_class) for layer in self._layers())
         return [wrapped for _ in self._get_indices(indices)]
+
+    def _all(self, call: str, indices: int | Iterable[int] | None) -> None:
+        if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
+            raise ValueError(f"{call}, indices={indices!r}): the slots are one batch, name all {self.num_envs} or none")
 
     def _layers(self) -> list[Any]:
         """The environment and what is inside it."""
@@ -108,20 +115,26 @@ class SB3VecEnv(VecEnv):
 
 
 def _together(each: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
-    """Options of the batch from one mapping a slot."""
+    """Options of the batch from one mapping a slot: what is the same for all passes as it is, the rest is stacked."""
     if not any(each):
         return None
     if any(options.keys() != each[0].keys() for options in each):
         raise ValueError("reset options must name the same things for every slot")
-    return {name: np.stack([np.asarray(options[name]) for options in each]) for name in each[0]}
+    together = {}
+    for name, first in each[0].items():
+        values = [np.asarray(options[name]) for options in each]
+        together[name] = first if all(np.array_equal(values[0], value) for value in values) else np.stack(values)
+    return together
 
 
 def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Weights and biases, inputs first, of an actor whose hidden layers are dense with tanh.
 
     Raises:
-        ValueError: the actor has layers of another kind.
+        ValueError: the actor has layers of another kind, or squashes what comes out of them.
     """
+    if policy.squash_output:
+        raise ValueError("squash_output=True: a frozen policy clips its output, it does not squash it")
     hidden = list(policy.mlp_extractor.policy_net)
     dense, between = [*hidden[::2], policy.action_net], hidden[1::2]
     if any(type(layer).__name__ != "Linear" for layer in dense) or any(type(f).__name__ != "Tanh" for f in between):

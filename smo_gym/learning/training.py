@@ -1,129 +1,41 @@
-"""Training runs: settings in rl-baselines3-zoo's shape, checkpoints to resume from, evaluation on unseen plants."""
+"""Training runs: checkpoints to resume from, evaluation on unseen plants, and the policy as it is kept."""
 
 from __future__ import annotations
 
-import inspect
 import json
 import math
 import os
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
-import yaml
-from gymnasium.vector import AutoresetMode, VectorEnv
-from numpy.typing import NDArray
+from gymnasium.vector import AutoresetMode
 
 from ..evaluation import files
-from ..validation import choice, mapping
 from .measurement import TRAINING, VALIDATION, measure, seeds
-from .observations import KINDS, VectorAgentView, units
+from .observations import KINDS, units
 from .policy import Card, LstmPolicy, MlpPolicy
 from .sb3 import SB3VecEnv, layers, lstm_weights
+from .settings import ALGORITHMS, Run, learner, make
 
 try:
-    from sb3_contrib import RecurrentPPO
-    from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
-    from stable_baselines3.common.utils import LinearSchedule
     from stable_baselines3.common.vec_env import VecMonitor
 except ImportError as error:
     raise ImportError('training needs Stable-Baselines3 and sb3-contrib: pip install "smo_gym[rl]"') from error
 
-Array = NDArray[np.float64]
-
-ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "recurrent": RecurrentPPO}
-VIEW = "smo_gym.learning.observations.agent_view"
 CHECKPOINTS = 20
 BEST = "best.safetensors"
 
 
-@dataclass(frozen=True)
-class Run:
-    """All that a trained policy depends on."""
-
-    environment: str
-    observation: str
-    algorithm: str
-    seed: int
-    steps: int
-    n_envs: int
-    options: dict[str, Any]
-    """Of the environment."""
-    hyperparameters: dict[str, Any]
-    """Of the algorithm."""
-
-    def checked(self) -> Run:
-        """Itself, when an environment and an algorithm can be made of it.
-
-        Raises:
-            ValueError: a name or value that is not allowed.
-        """
-        choice("observation", self.observation, KINDS)
-        if self.algorithm == "recurrent" and self.observation != "positions":
-            raise ValueError(f"observation={self.observation!r}: the recurrent algorithm is for 'positions' alone")
-        known = set(inspect.signature(ALGORITHMS[self.algorithm].__init__).parameters) - {"self", "env", "seed"}
-        mapping("hyperparameter", self.hyperparameters, known)
-        counts = {"n_envs": self.n_envs, "n_timesteps": self.steps, "n_steps": self.hyperparameters.get("n_steps")}
-        for name, value in counts.items():
-            if not isinstance(value, int) or value < 1:
-                raise ValueError(f"{name}={value!r} must be a whole number of at least 1")
-        built(self)
-        make(self, 1, AutoresetMode.SAME_STEP).close()
-        return self
-
-
-def load(
-    path: Path,
-    environment: str,
-    algorithm: str,
-    observation: str | None = None,
-    seed: int = 0,
-    steps: int | None = None,
-    uncertainty: float | None = None,
-) -> Run:
-    """A run from a file of hyperparameters in rl-baselines3-zoo's shape; what is given here takes their place.
+def frozen(model: Any, run: Run) -> MlpPolicy:
+    """The policy that a model would act by, without exploration.
 
     Raises:
-        ValueError: the file cannot be read, or an unknown, missing or bad value.
+        ValueError: its network is not dense with tanh, nor that behind one LSTM layer, or its output is squashed.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"{path}: is not YAML ({' '.join(str(error).split())})") from None
-    try:
-        if not isinstance(data, dict):
-            raise ValueError("must be a mapping of environments to hyperparameters")
-        entry = data[choice("environment", environment, data)]
-        given = dict(entry) if isinstance(entry, dict) else {}
-        if missing := {"n_envs", "n_timesteps", "policy", "env_wrapper"} - given.keys():
-            raise ValueError(f"{environment} lacks {', '.join(sorted(missing))}")
-        wrapper = given.pop("env_wrapper")
-        if not isinstance(wrapper, list) or len(wrapper) != 1 or list(wrapper[0]) != [VIEW]:
-            raise ValueError(
-                f"{environment}: env_wrapper={wrapper!r} must be a list of {VIEW} with its arguments alone"
-            )
-        options = given.pop("env_kwargs", {}) | ({} if uncertainty is None else {"uncertainty": uncertainty})
-        n_envs, n_timesteps = given.pop("n_envs"), given.pop("n_timesteps")
-        kind = observation or wrapper[0][VIEW]["observation"]
-        return Run(environment, kind, algorithm, seed, int(steps or n_timesteps), int(n_envs), options, given).checked()
-    except (ValueError, TypeError, gymnasium.error.Error) as error:
-        raise ValueError(f"{path}: {error}") from None
-
-
-def make(run: Run, n: int, mode: AutoresetMode, **others: Any) -> VectorEnv[Any, Any, Any]:
-    """The run's environment as an agent sees it."""
-    env = gymnasium.make_vec(run.environment, n, autoreset_mode=mode, **{**run.options, **others})
-    return VectorAgentView(env, run.observation)
-
-
-def frozen(model: Any, run: Run) -> MlpPolicy:
-    """The policy that a model would act by, without exploration."""
     actor = model.policy
     weights, lstm = layers(actor), getattr(actor, "lstm_actor", None)
     env = make(run, 1, AutoresetMode.SAME_STEP)
@@ -181,14 +93,14 @@ class Watch(BaseCallback):
         self._progress(self.num_timesteps, found)
 
     def _restart(self) -> None:
-        seed = seeds(TRAINING, 1, self._run.seed, self.num_timesteps)[0]
+        seed, n = seeds(TRAINING, 1, self._run.seed, self.num_timesteps)[0], self._run.n_envs
         self.model.set_random_seed(seed)
-        self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
         # the first episodes end at random times: else all slots would go through their episodes in step, and every
         # update would see one phase of them alone
-        left, task = (self.training_env.get_attr(name, 0)[0] for name in ("_steps_left", "task"))
-        left[:] = np.random.default_rng(seed).integers(1, task.steps, len(left), endpoint=True)
-        self.model._last_episode_starts = np.ones(self._run.n_envs, dtype=np.bool_)
+        most = self.training_env.get_attr("task", 0)[0].steps
+        self.training_env.set_options({"steps": np.random.default_rng(seed).integers(1, most, n, endpoint=True)})
+        self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
+        self.model._last_episode_starts = np.ones(n, dtype=np.bool_)
 
     def _on_step(self) -> bool:
         return True
@@ -223,22 +135,22 @@ def train(
         test plants on its card.
 
     Raises:
-        ValueError: the folder holds a run of other settings, or a checkpoint that cannot be read.
+        ValueError: hyperparameters that nothing can be made of, or a network that cannot be frozen; the folder holds
+            a run of other settings, or a checkpoint that cannot be read or stands alone.
     """
-    agree(folder / "run.json", asdict(run))
     checkpoint = folder / "checkpoint.zip"
     env = VecMonitor(SB3VecEnv(make(run, run.n_envs, AutoresetMode.SAME_STEP)))
     log = str(folder / "tensorboard") if tensorboard else None
-    algorithm = ALGORITHMS[run.algorithm]
-    if checkpoint.exists():
+    begun = checkpoint.exists()
+    if not begun:
+        model = learner(run, env, log)
+        frozen(model, run)  # what cannot be frozen is noticed now, not at the first checkpoint
+    agree(folder / "run.json", asdict(run), begun)
+    if begun:
         try:
-            model = algorithm.load(checkpoint, env=env, device="cpu", tensorboard_log=log)
+            model = ALGORITHMS[run.algorithm].load(checkpoint, env=env, device="cpu", tensorboard_log=log)
         except Exception as error:  # whatever a damaged zip and pickle may raise
             raise ValueError(f"{checkpoint}: cannot be read ({error}): remove it to begin anew") from None
-    else:
-        model = algorithm(
-            env=env, seed=seeds(TRAINING, 1, run.seed)[0], device="cpu", tensorboard_log=log, **built(run)
-        )
     watch = Watch(run, checkpoint, progress)
     progress(model.num_timesteps, {})
     if model.num_timesteps < run.steps:
@@ -249,20 +161,24 @@ def train(
     return replace(policy, card=card)
 
 
-def agree(path: Path, settings: dict[str, Any]) -> None:
+def agree(path: Path, settings: dict[str, Any], begun: bool) -> None:
     """Write the settings of a run, or see that those that stand there are the same.
 
     Raises:
-        ValueError: they are not; the differences are named.
+        ValueError: they are not, and the differences are named; or a run has begun here and they are missing.
     """
     wanted = json.loads(json.dumps(settings))
-    if not path.exists():
+    if not (begun or path.exists()):
         files.write(path, json.dumps(wanted, indent=1) + "\n")
         return
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, json.JSONDecodeError) as error:
-        raise ValueError(f"{path}: cannot be read ({error})") from None
+        if not isinstance(found, dict):
+            raise ValueError(f"{found!r} is no mapping of settings")
+    except (OSError, ValueError) as error:
+        raise ValueError(
+            f"{path}: cannot be read ({error}): it says what run the checkpoint is of; empty the folder to begin anew"
+        ) from None
     if found != wanted:
         differences = [
             f"{name} is {found.get(name)!r} there and {wanted.get(name)!r} here"
@@ -270,15 +186,3 @@ def agree(path: Path, settings: dict[str, Any]) -> None:
             if found.get(name) != wanted.get(name)
         ]
         raise ValueError(f"{path.parent} holds a run with another configuration: {'; '.join(differences)}")
-
-
-def built(run: Run) -> dict[str, Any]:
-    """Hyperparameters with the zoo's schedules: lin_1e-3 falls from 1e-3 to 0."""
-    found = dict(run.hyperparameters)
-    for name, value in found.items():
-        if isinstance(value, str) and value.startswith("lin_"):
-            try:
-                found[name] = LinearSchedule(float(value.removeprefix("lin_")), 0.0, 1.0)
-            except ValueError:
-                raise ValueError(f"{name}={value!r} must be a number, or lin_ and a number") from None
-    return found
