@@ -73,6 +73,29 @@ def test_seeds_lead_to_other_policies(command, tmp_path):
     assert not np.array_equal(policies[0].layers[0][0], policies[1].layers[0][0])
 
 
+def test_first_episodes_end_out_of_step_on_one_reference(tmp_path, monkeypatch):
+    """Cutting an episode short must not move the clock that the reference is read by."""
+    done, desired = [], []
+
+    class Spy(training.SB3VecEnv):
+        def step_wait(self):
+            result = super().step_wait()
+            done.append(result[2])
+            desired.append(self.vector_info["desired"])
+            return result
+
+    monkeypatch.setattr(training, "SB3VecEnv", Spy)
+    options = {"horizon": 0.32, "track_limit": None, "angle_limit": None}
+    hyperparameters = {"policy": "MlpPolicy", "n_steps": 16, "batch_size": 32, "n_epochs": 1}
+    training.train(settings.Run("SMOPendulumTracking-v0", "smo", "ppo", 0, 64, 4, options, hyperparameters), tmp_path)
+    first = np.argmax(done, axis=0)
+    assert np.all(done, axis=1).sum() == 0 < np.any(done, axis=0).sum()
+    assert len(set(first)) > 1
+    before = [step[first > k] for k, step in enumerate(desired[: first.max()])]
+    assert all(np.array_equal(slots, np.repeat(slots[:1], len(slots), axis=0)) for slots in before)
+    assert not np.array_equal(before[0][0], before[-1][0])
+
+
 def test_another_configuration_does_not_resume(command, capsys):
     assert command() == 0
     assert command("--seed", "3", "--uncertainty", "0.1") == 2
@@ -88,7 +111,7 @@ def test_a_damaged_checkpoint_is_named(command, tmp_path, capsys):
     assert "checkpoint.zip: cannot be read" in capsys.readouterr().err
 
 
-def test_a_checkpoint_without_its_settings_is_of_nobody_knows_what(command, tmp_path, capsys):
+def test_a_checkpoint_without_its_hyperparametersis_of_nobody_knows_what(command, tmp_path, capsys):
     assert command("--steps", "32") == 0
     run = tmp_path / "run/run.json"
     for text in ("[]", "{", None):
