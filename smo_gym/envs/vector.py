@@ -169,12 +169,11 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         return mask
 
     def _instants(self, steps: Any) -> NDArray[np.int64]:
-        given, most = np.asarray(steps), self.task.steps
-        if given.dtype.kind not in "iu" or given.shape not in ((), (self.num_envs,)):
-            raise ValueError(f"options['steps']={steps!r} must be a whole number or an array of {self.num_envs}")
-        if given.min() < 1 or given.max() > most:
-            raise ValueError(f"options['steps']={steps!r} must be from 1 to {most}, the control periods of the horizon")
-        return np.broadcast_to(given, self.num_envs).astype(np.int64)
+        given, n, most = np.asarray(steps), self.num_envs, self.task.steps
+        whole = given.dtype.kind in "iu" and given.shape in ((), (n,))
+        if not whole or given.min() < 1 or given.max() > most:
+            raise ValueError(f"options['steps']={steps!r} must be a whole number from 1 to {most}, or {n} such numbers")
+        return np.broadcast_to(given, n).astype(np.int64)
 
     def _seed(self, seed: int | Sequence[int | None] | None, mask: Flags) -> None:
         n = self.num_envs
