@@ -40,7 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--target", choices=tuple(PROBLEMS), default="lqr", help="default %(default)s")
     add("--restarts", type=int, default=2, metavar="N", help="random starts (default 2)")
     add("--generations", type=int, default=80, metavar="N", help="of each search (default 80)")
-    add("--refit", type=int, default=20, metavar="N", help="generations for each rejected hypothesis (default 20)")
+    add("--refit", type=int, default=10, metavar="N", help="generations for each rejected hypothesis (default 10)")
     add("--seed", type=int, default=0, help="of the first start (default 0)")
     add("--out", type=Path, default=Path("identification"), metavar="DIR", help="default %(default)s")
     args = parser.parse_args(arguments)
