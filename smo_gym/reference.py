@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from .kernels import plain
 from .kernels.cart_pendulum import control_affine, energy
 from .plant import CartPendulum, advance
-from .validation import array, multiple, number, unknown
+from .validation import array, multiple, number, unknown, whole
 
 Array = NDArray[np.float64]
 _DEGREE = 4  # Radau points in a finite element
@@ -144,9 +144,7 @@ def minimum_energy(
     start, end = array("x0", x0, (4,)), array("xT", xT, (4,))
     T = number("horizon", horizon, above=0.0)
     bound = number("force_limit", force_limit, above=0.0)
-    for name, value in (("elements", elements), ("refine", refine)):
-        if not isinstance(value, int) or value < 1:
-            raise ValueError(f"{name}={value!r} must be a positive integer")
+    elements, refine = whole("elements", elements, 1), whole("refine", refine, 1)
     try:
         import casadi
     except ImportError:

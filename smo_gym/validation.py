@@ -3,11 +3,19 @@
 import difflib
 import math
 import numbers
+import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+MOST = 1e8
+"""Integration steps in a control period, control periods in an episode: more is a slip, not a simulation."""
+_LONGEST = 200  # characters of a value in a message
+_REPR = reprlib.Repr()
+_REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 12
+_REPR.maxstring = _REPR.maxother = _LONGEST
 
 
 def number(name: str, value: Any, *, above: float = -math.inf, below: float = math.inf) -> float:
@@ -16,12 +24,28 @@ def number(name: str, value: Any, *, above: float = -math.inf, below: float = ma
     Raises:
         ValueError: it is not.
     """
-    plain = isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_)
-    result = float(value) if plain else math.nan
+    try:
+        result = (
+            float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool | np.bool_) else math.nan
+        )
+    except OverflowError:
+        result = math.inf
     if not (math.isfinite(result) and above < result < below):
         bounds = [f"greater than {above:g}"] * math.isfinite(above) + [f"less than {below:g}"] * math.isfinite(below)
-        raise ValueError(f"{name}={value!r} must be a finite number{' ' if bounds else ''}{' and '.join(bounds)}")
+        raise ValueError(f"{name}={short(value)} must be a finite number{' ' if bounds else ''}{' and '.join(bounds)}")
     return result
+
+
+def whole(name: str, value: Any, least: int) -> int:
+    """A whole number, Python's or NumPy's, of at least ``least``, as an int.
+
+    Raises:
+        ValueError: it is not.
+    """
+    if not isinstance(value, numbers.Integral) or isinstance(value, bool) or value < least:
+        kind = "positive integer" if least == 1 else f"whole number of at least {least}"
+        raise ValueError(f"{name}={short(value)} must be a {kind}")
+    return int(value)
 
 
 def limit(name: str, value: Any) -> float:
@@ -30,7 +54,7 @@ def limit(name: str, value: Any) -> float:
     Raises:
         ValueError: it is neither None nor a positive number.
     """
-    if value is None or value == math.inf:
+    if value is None or (isinstance(value, numbers.Real) and value == math.inf):
         return math.inf
     return number(name, value, above=0.0)
 
@@ -43,7 +67,7 @@ def mapping(what: str, value: Any, known: Iterable[str]) -> dict[str, Any]:
     """
     if not isinstance(value, Mapping):
         raise ValueError(
-            f"{what}: {value!r} must be a mapping with the keys {', '.join(map(repr, sorted(map(str, known))))}"
+            f"{what}: {short(value)} must be a mapping with the keys {', '.join(map(repr, sorted(map(str, known))))}"
         )
     for name in value:
         choice(what, name, known)
@@ -58,25 +82,36 @@ def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.flo
     """
     try:
         result = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}={value!r} must be an array of numbers of shape {shape}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name}={short(value)} must be an array of numbers of shape {shape}") from None
     if result.shape != shape:
         raise ValueError(f"{name} has shape {result.shape}, it must have shape {shape}")
     if not np.isfinite(result).all():
-        raise ValueError(f"{name}={result.tolist()!r} must be finite")
+        raise ValueError(f"{name}={short(result.tolist())} must be finite")
     return result
 
 
 def multiple(name: str, value: Any, of_name: str, of: float) -> int:
-    """How many times ``of`` goes into ``value``: a whole number, at least 1.
+    """How many times ``of`` goes into ``value``: a whole number from 1 to :data:`MOST`.
 
     Raises:
-        ValueError: it is no whole number.
+        ValueError: it is no such number.
     """
-    ratio = number(name, value, above=0.0) / of
+    ratio = number(name, value, above=0.0) / number(of_name, of, above=0.0)
+    if ratio > MOST:
+        raise ValueError(f"{name}={value!r} must be at most {MOST:g} times {of_name}={of!r}")
     if round(ratio) < 1 or abs(ratio - round(ratio)) > 1e-9 * ratio:
         raise ValueError(f"{name}={value!r} must be a whole multiple of {of_name}={of!r}")
     return round(ratio)
+
+
+def short(value: Any) -> str:
+    """A value in a message: its repr, cut where it is long."""
+    try:
+        text = _REPR.repr(value)
+    except Exception:  # whatever a user's repr may raise, or an integer of too many digits
+        return f"a {type(value).__name__}"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
 def unknown(what: str, name: object, known: Iterable[str]) -> str:
@@ -85,7 +120,7 @@ def unknown(what: str, name: object, known: Iterable[str]) -> str:
     lower = {word.lower(): word for word in known}
     near = difflib.get_close_matches(str(name).lower(), lower, n=1, cutoff=0.5)
     hint = f"did you mean {lower[near[0]]!r}? " if near else ""
-    return f"unknown {what} {name!r}: {hint}known are {', '.join(map(repr, known))}"
+    return f"unknown {what} {short(name)}: {hint}known are {', '.join(map(repr, known))}"
 
 
 def choice(what: str, name: Any, known: Iterable[str]) -> str:
@@ -95,6 +130,6 @@ def choice(what: str, name: Any, known: Iterable[str]) -> str:
         ValueError: it is not, with a suggestion.
     """
     known = list(known)
-    if name not in known:
+    if not isinstance(name, str) or name not in known:
         raise ValueError(unknown(what, name, known))
     return str(name)

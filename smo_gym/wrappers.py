@@ -10,15 +10,24 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
-from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv, VectorEnv, VectorWrapper
+from gymnasium.vector import (
+    AsyncVectorEnv,
+    AutoresetMode,
+    SyncVectorEnv,
+    VectorEnv,
+    VectorObservationWrapper,
+    VectorWrapper,
+)
 from numpy.typing import NDArray
 
 from .envs.pendulum import PendulumEnv
-from .envs.task import Task
+from .envs.task import Task, plain_data
+from .envs.vector import PendulumVectorEnv, only
 from .observers import OBSERVERS, Observer, Oracle, Period, SlidingModeObserver
-from .validation import choice, unknown
+from .validation import choice, short, unknown
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 # A force without limit bounds nothing: the step is then checked for the largest that the article's runs reach.
 _USUAL_FORCE = 30.0
 
@@ -50,23 +59,44 @@ def make_observer(observer: str | Observer, compensation: bool | None, settings:
 def _named(observer: Any, compensation: bool | None, settings: dict[str, Any]) -> dict[str, Any]:
     """The constructor's arguments as plain data, so that a spec survives JSON."""
     if isinstance(observer, SlidingModeObserver):
-        return {"observer": "smo", **observer.as_dict()}
+        return {"observer": "smo", **plain_data(observer.as_dict())}
     if isinstance(observer, Oracle):
         return {"observer": "oracle"}
-    return {"observer": observer, "compensation": compensation, **settings}
+    return {"observer": observer, "compensation": compensation, **plain_data(settings)}
 
 
-def task_of(env: Any) -> Task:
-    """The task of an environment, scalar or vector, that observes what its task tells and no more.
+UNSEEN = (
+    "an observer reads what the encoders measured, info['samples'], and would not see this. Noise, quantisation or "
+    "delay of a sensor belongs into a wrapper inside that changes info['samples'] and the observation alike; a change "
+    "that is meant for the agent alone belongs outside the observer"
+)
+
+
+def task_of(env: Any, batch: bool | None = None) -> Task:
+    """The task of an environment that observes what its task tells and no more.
+
+    Args:
+        env: the environment, scalar or vector.
+        batch: whether it must be the one or the other.
 
     Raises:
-        TypeError: the environment is not one of this package.
-        ValueError: its slots have different tasks, or something has changed what it observes.
+        TypeError: the environment is not one of this package, or scalar where a vector is wanted, or the reverse.
+        ValueError: its slots have different tasks, or something changes what it observes.
     """
+    if not isinstance(env, gymnasium.Env | VectorEnv):
+        raise TypeError(f"env={short(env)} must be a smo_gym environment, as gymnasium.make or make_vec gives it")
+    if batch is not None and batch != isinstance(env, VectorEnv):
+        kind = "VectorObserverWrapper (or VectorAgentView)" if not batch else "ObserverWrapper (or agent_view)"
+        raise TypeError(f"{env} is {'one environment' if batch else 'a batch'}: wrap it in {kind}")
+    layer: Any = env
+    while isinstance(layer, gymnasium.Wrapper | VectorWrapper):
+        if isinstance(layer, gymnasium.ObservationWrapper | VectorObservationWrapper):
+            raise ValueError(f"{layer} changes the observation: {UNSEEN}")
+        layer = layer.env
     base = env.unwrapped
-    batch = isinstance(base, SyncVectorEnv | AsyncVectorEnv)
+    many = isinstance(base, SyncVectorEnv | AsyncVectorEnv)
     try:
-        task, *others = base.get_attr("task") if batch else [base.task]
+        task, *others = base.get_attr("task") if many else [base.task]  # type: ignore[union-attr]
     except AttributeError:
         task, others = None, []
     if not isinstance(task, Task):
@@ -77,6 +107,22 @@ def task_of(env: Any) -> Task:
     if space.shape != task.observation_space.shape:
         raise ValueError(f"{env} observes {space}: an observer or view must stand inside whatever else changes that")
     return task
+
+
+def _measured(observation: Array, y: Array) -> None:
+    """See that what is observed is what the encoders measured, (..., 2) each.
+
+    Raises:
+        ValueError: something between the environment and the observer has changed it.
+    """
+    if not np.array_equal(observation, y):
+        raise ValueError(f"the environment observes {short(observation)} where {short(y)} was measured: {UNSEEN}")
+
+
+def _lost(xhat: Array) -> Flags | None:
+    """Which estimates (4, n) are not finite, (n,); None where all are."""
+    finite = np.isfinite(xhat)
+    return None if finite.all() else np.asarray(~finite.all(axis=0))
 
 
 def _force(task: Task) -> float:
@@ -98,6 +144,9 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
     ``reset`` the estimate is ``xhat0`` (zero by default, as in the article). Put wrappers that rescale the action
     outside: the control laws of this package give newtons.
 
+    An estimate can grow beyond all bounds in finite time. One that is not finite any more starts anew, as at a reset,
+    and ``info["estimate_failed"]`` is true for that step; observations are always finite.
+
     Without a force limit the observer's step is checked for forces up to 30 N, about what the article's runs reach.
 
     Frames show the estimate as a ghost beside the state.
@@ -111,8 +160,9 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
 
     Raises:
         TypeError: the environment is not one of this package, or ``observer`` is not an observer.
-        ValueError: an unknown observer or setting, settings beside an object, or a step that the observer is not
-            stable at.
+        ValueError: an unknown observer or setting, settings beside an object, a step that the observer is not
+            stable at, or a wrapper inside that changes what the encoders measured (seen at once, or at the first
+            observation that differs).
     """
 
     def __init__(
@@ -124,9 +174,10 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
     ) -> None:
         RecordConstructorArgs.__init__(self, **_named(observer, compensation, settings))
         gymnasium.Wrapper.__init__(self, env)
-        task = task_of(env)
+        task = task_of(env, batch=False)
         self.observer = make_observer(observer, compensation, settings)
         self._estimator = self.observer.start(1, task.dt, _force(task), task.params)
+        self._every = np.ones(1, dtype=np.bool_)
         self._show = cast(PendulumEnv, env.unwrapped).show
         self._show(self._estimator.xhat[:, 0])
         self.observation_space = _space(env.observation_space)
@@ -134,27 +185,34 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Start the episode and the estimate."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._estimator.reset(np.ones(1, dtype=np.bool_), info["state"][:, None])
-        self._show(self._estimator.xhat[:, 0])
-        return self._append(observation, info), info
+        self._estimator.reset(self._every, info["state"][:, None])
+        return self._append(observation, info, False), info
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
         """Run a control period and bring the estimate to its end."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         samples, force, state = info["samples"], info["force"], info["state"]
         self._estimator.update(Period(self._y, samples[:, :, None], np.array([force]), state[:, None]))
-        self._show(self._estimator.xhat[:, 0])
-        return self._append(observation, info), reward, terminated, truncated, info
+        lost = _lost(self._estimator.xhat) is not None
+        if lost:
+            self._estimator.reset(self._every, state[:, None])
+        return self._append(observation, info, lost), reward, terminated, truncated, info
 
-    def _append(self, observation: Array, info: dict[str, Any]) -> Array:
-        self._y = info["samples"][-1][:, None]
-        return np.concatenate([observation, self._estimator.xhat[:, 0]])
+    def _append(self, observation: Array, info: dict[str, Any], lost: bool) -> Array:
+        y = info["samples"][-1]
+        _measured(observation[:2], y)
+        self._y = y[:, None].copy()
+        info["estimate_failed"] = lost
+        xhat = self._estimator.xhat[:, 0]
+        self._show(xhat)
+        return np.concatenate([observation, xhat])
 
 
 class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], RecordConstructorArgs):
     """The vector twin of :class:`ObserverWrapper`, for the native vector environments and for Gymnasium's own.
 
     All three autoreset modes work; in SAME_STEP ``info["final_obs"]`` carries the last estimate of the episode too.
+    ``info["estimate_failed"]`` (n,) tells the slots whose estimate was lost in this step and started anew.
 
     Args:
         env: a vector environment of this package, or Gymnasium's vector environment of scalar ones.
@@ -177,7 +235,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
     ) -> None:
         RecordConstructorArgs.__init__(self, **_named(observer, compensation, settings))
         VectorWrapper.__init__(self, env)
-        task = task_of(env)
+        task = task_of(env, batch=True)
         n, plant = env.num_envs, (task.dt, _force(task), task.params)
         if isinstance(observer, Sequence) and not isinstance(observer, str):
             if settings or compensation is not None:
@@ -191,6 +249,9 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
             self._estimator = make_observer(observer, compensation, settings).start(n, *plant)
         self._mode = env.metadata["autoreset_mode"]
         self._over = np.zeros(n, dtype=np.bool_)
+        self._none, self._every = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.bool_)
+        base = env.unwrapped
+        self._show = base.show if isinstance(base, PendulumVectorEnv) else lambda xhat: None
         self.single_observation_space = _space(env.single_observation_space)
         self.observation_space = _space(env.observation_space)
 
@@ -198,11 +259,11 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Start the episodes and their estimates."""
-        started = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         observation, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
+        started = (options or {}).get("reset_mask", self._every)
         self._estimator.reset(started, info["state"].T)
         self._over[started] = False
-        return self._append(observation, info), info
+        return self._append(observation, info, self._none), info
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Run a control period and bring the estimates to its end."""
@@ -214,20 +275,30 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         last = _at_the_end(info) if same_step and any_restarted else info
         samples = np.ascontiguousarray(last["samples"].transpose(1, 2, 0))
         self._estimator.update(Period(self._y, samples, last["force"], np.ascontiguousarray(last["state"].T)))
+        lost = _lost(self._estimator.xhat)
+        if lost is not None:
+            self._estimator.reset(lost, last["state"].T)
+        failed: Flags = self._none if lost is None else lost
         if same_step and any_restarted:
-            final_obs = info["final_obs"]
+            final_obs, xhat = info["final_obs"], self._estimator.xhat
             for i in np.flatnonzero(ended):
-                final_obs[i] = np.concatenate([final_obs[i], self._estimator.xhat[:, i]])
+                final_obs[i] = np.concatenate([final_obs[i], xhat[:, i]])
+            info["final_info"] |= {"estimate_failed": only(failed, ended), "_estimate_failed": ended.copy()}
         if any_restarted and self._mode is not AutoresetMode.DISABLED:
             self._estimator.reset(restarted, info["state"].T)
+            failed = only(failed, ~restarted)
         self._over = ended
-        return self._append(observation, info), reward, terminated, truncated, info
+        return self._append(observation, info, failed), reward, terminated, truncated, info
 
-    def _append(self, observation: Array, info: dict[str, Any]) -> Array:
-        self._y = info["samples"][:, -1].T.copy()
+    def _append(self, observation: Array, info: dict[str, Any], failed: Flags) -> Array:
+        y, xhat = info["samples"][:, -1], self._estimator.xhat
+        _measured(observation[:, :2], y)
+        self._y = y.T.copy()
+        info |= {"estimate_failed": failed.copy(), "_estimate_failed": self._every.copy()}
+        self._show(xhat)
         appended = np.empty((len(observation), observation.shape[1] + 4))
         appended[:, :-4] = observation
-        appended[:, -4:] = self._estimator.xhat.T
+        appended[:, -4:] = xhat.T
         return appended
 
 

@@ -1,15 +1,22 @@
 """What the feedback laws share: where an observation holds the estimate, and the checks of weights."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..validation import array, number
+from ..envs.task import Task
+from ..plant import CartPendulum
+from ..validation import array, number, short
 
 Array = NDArray[np.float64]
 
 
-def estimated_error(observation: Array) -> Array:
+def estimated_error(observation: ArrayLike, wrap: bool) -> Array:
     """What a law should bring to zero, (..., 4): xhat, or xhat - x_d where the observation tells x_d.
+
+    With ``wrap`` the error of the angle is the one within half a turn: an encoder goes on counting, and a rod that has
+    turned is where it was.
 
     The observation is [h, theta, xhat (4)], or with a reference [h, theta, x_d (4), preview (4 each), xhat (4)].
 
@@ -18,21 +25,45 @@ def estimated_error(observation: Array) -> Array:
     Raises:
         ValueError: the observation cannot come from an observer wrapper.
     """
-    size = observation.shape[-1]
+    try:
+        seen = np.asarray(observation, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"observation={short(observation)} must be an array of numbers") from None
+    size = seen.shape[-1] if seen.ndim in (1, 2) else 0
     if size < 6 or (size - 2) % 4:
         raise ValueError(
-            f"observation has shape {observation.shape}, it must begin with [h, theta] and end with xhat (4): "
+            f"observation has shape {seen.shape}, it must begin with [h, theta] and end with xhat (4): "
             "wrap the environment in smo_gym.ObserverWrapper or smo_gym.VectorObserverWrapper"
         )
-    xhat = observation[..., -4:]
-    return xhat if size == 6 else xhat - observation[..., 2:6]
+    error = seen[..., -4:] if size == 6 else seen[..., -4:] - seen[..., 2:6]
+    if not wrap:
+        return error
+    turns = np.zeros_like(error)
+    turns[..., 1] = np.rint(error[..., 1] / (2.0 * np.pi))
+    return np.asarray(error - 2.0 * np.pi * turns)
 
 
-def weights(Q: ArrayLike, R: float) -> tuple[Array, float]:
+def nominal(model: Any) -> CartPendulum:
+    """The plant that a law is designed for: a plant, what :meth:`CartPendulum.of` takes, or an environment's.
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    task = getattr(getattr(model, "unwrapped", None), "task", None)
+    if isinstance(task, Task):
+        return task.params
+    try:
+        return CartPendulum.of(model)
+    except ValueError as error:
+        raise ValueError(f"model={short(model)} must be a CartPendulum or a smo_gym environment ({error})") from None
+
+
+def weights(Q: ArrayLike, R: ArrayLike) -> tuple[Array, float]:
     """Q as a (4, 4) matrix and R as a float.
 
     Raises:
-        ValueError: Q is not symmetric positive semidefinite of shape (4,) or (4, 4), or R is not positive.
+        ValueError: Q is not symmetric positive semidefinite of shape (4,) or (4, 4), or R, a number or (1, 1), is not
+            positive.
     """
     matrix = array("Q", Q, np.shape(Q))
     matrix = np.diag(matrix) if matrix.shape == (4,) else matrix
@@ -41,5 +72,9 @@ def weights(Q: ArrayLike, R: float) -> tuple[Array, float]:
         or not np.allclose(matrix, matrix.T)
         or np.linalg.eigvalsh(matrix).min() < -1e-12 * max(1.0, np.abs(matrix).max())
     ):
-        raise ValueError(f"Q={Q!r} must be symmetric positive semidefinite, given as its diagonal (4,) or as (4, 4)")
-    return matrix, number("R", R, above=0.0)
+        raise ValueError(
+            f"Q={short(Q)} must be symmetric positive semidefinite, given as its diagonal (4,) or as (4, 4)"
+        )
+    if np.shape(R) not in ((), (1,), (1, 1)):
+        raise ValueError(f"R={short(R)} must be a positive number, or that as an array of shape (1, 1)")
+    return matrix, number("R", np.asarray(R).item() if np.ndim(R) else R, above=0.0)

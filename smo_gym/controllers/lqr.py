@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.linalg import LinAlgError
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_continuous_are
 
-from ..plant import CartPendulum
-from ..validation import array
-from .feedback import estimated_error, weights
+from ..validation import array, short
+from .feedback import estimated_error, nominal, weights
 
 Array = NDArray[np.float64]
+_SLOWEST = 1e-6  # of the fastest pole's size: nearer to the axis a pole is on it, but for rounding
 
 
 class LQR:
@@ -18,35 +21,49 @@ class LQR:
 
     Args:
         K: gain in N/m, N/rad, N s/m, N s/rad, shape (4,); or (n, 4), one a slot.
+        wrap: take the error of the angle within half a turn, so that a rod that has turned may rest where it is; the
+            article's scenarios do without.
 
     Raises:
         ValueError: K has another shape or is not finite.
     """
 
-    def __init__(self, K: ArrayLike) -> None:
+    def __init__(self, K: ArrayLike, wrap: bool = True) -> None:
         shape = np.shape(K)
         if shape[-1:] != (4,) or len(shape) > 2:
             raise ValueError(f"K has shape {shape}, it must have shape (4,) or (n, 4)")
         self.K = np.atleast_2d(array("K", K, shape))
+        self.wrap = wrap
 
     @classmethod
-    def design(cls, Q: ArrayLike, R: float, model: CartPendulum | None = None) -> LQR:
+    def design(cls, Q: ArrayLike, R: ArrayLike, model: Any = None, wrap: bool = True) -> LQR:
         """The gain that minimises the integral of ``x' Q x + R u^2`` for the model linearised about x = 0.
 
         ``K = B' P / R`` with P from the algebraic Riccati equation ``A' P + P A - P B B' P / R + Q = 0``.
 
         Args:
             Q: weights, the diagonal (4,) or a symmetric positive semidefinite (4, 4).
-            R: weight of the force, positive.
-            model: nominal plant (Table 2 by default).
+            R: weight of the force, positive; a number or an array of shape (1, 1).
+            model: nominal plant, or an environment, whose nominal plant is taken (Table 2 by default).
+            wrap: as of the class.
 
         Raises:
-            ValueError: a weight is not allowed.
+            ValueError: a weight is not allowed, or under these weights no gain makes x = 0 asymptotically stable.
         """
-        A, B = (model or CartPendulum()).linearise()
-        Q, R = weights(Q, R)
-        P = solve_continuous_are(A, B, Q, np.array([[R]]))
-        return cls((B.T @ P)[0] / R)
+        A, B = nominal(model).linearise()
+        weight, r = weights(Q, R)
+        try:
+            P = solve_continuous_are(A, B, weight, np.array([[r]]))
+            K = (B.T @ P)[0] / r
+            poles = np.linalg.eigvals(A - B @ K[None])
+        except (LinAlgError, ValueError):  # SciPy found no stabilising solution
+            poles = np.array([np.nan])
+        if not poles.real.max() < -_SLOWEST * np.abs(poles).max():
+            raise ValueError(
+                f"Q={short(Q)} leaves x = 0 without asymptotic stability (largest real part of a closed-loop pole "
+                f"{poles.real.max():.1e} 1/s): give every motion a weight, h above all, as Q = [1, 1, 0, 0] does"
+            )
+        return cls(K, wrap)
 
     def predict(
         self,
@@ -60,13 +77,13 @@ class LQR:
         Raises:
             ValueError: the observation does not come from an observer wrapper, or K has another number of slots.
         """
-        e = estimated_error(observation)
+        e = estimated_error(observation, self.wrap)
         if len(self.K) > 1 and e.shape[:-1] != (len(self.K),):
             raise ValueError(f"K has {len(self.K)} slots, the observation has shape {np.shape(observation)}")
         # one order of summation for every batch size, which a matrix product does not promise
         K = self.K
         u = -(K[:, 0] * e[..., 0] + K[:, 1] * e[..., 1] + K[:, 2] * e[..., 2] + K[:, 3] * e[..., 3])
-        return (u[:, None] if observation.ndim == 2 else u), state
+        return (u[:, None] if e.ndim == 2 else u), state
 
     def __repr__(self) -> str:
         return f"LQR(K={self.K.squeeze().tolist()})"

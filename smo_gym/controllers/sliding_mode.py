@@ -33,6 +33,7 @@ class SlidingModeController:
         Z0: amplitude in N (Table 6).
         lam: weight of the integral (Table 6).
         epsilon: period of the switching function (Table 6).
+        wrap: take the error of the angle within half a turn; the article's scenarios do without.
 
     Raises:
         ValueError: a gain is not positive or has a wrong shape.
@@ -46,6 +47,7 @@ class SlidingModeController:
         Z0: float = SMC_GAINS["Z0"],
         lam: float = SMC_GAINS["lam"],
         epsilon: float = SMC_GAINS["epsilon"],
+        wrap: bool = True,
     ) -> None:
         shape = np.shape(k)
         if shape[-1:] != (4,) or len(shape) > 2:
@@ -60,6 +62,7 @@ class SlidingModeController:
         self.Z0 = number("Z0", Z0, above=0.0)
         self.lam = number("lam", lam, above=0.0)
         self.epsilon = number("epsilon", epsilon, above=0.0)
+        self.wrap = wrap
         rows = [self.k, np.broadcast_to(np.minimum(self.slope, 1e300)[..., None], (*shape[:-1], 1))]  # 1e300: sgn
         self._gains = np.atleast_2d(np.concatenate(rows, axis=-1))
         self._settings = np.array([self.Z0, self.lam, math.pi / self.epsilon, self.dt])
@@ -85,16 +88,16 @@ class SlidingModeController:
         Raises:
             ValueError: the observation does not come from an observer wrapper.
         """
-        e = np.atleast_2d(estimated_error(observation))
+        e = np.atleast_2d(estimated_error(observation, self.wrap))
         n = len(e)
         if len(self._gains) not in (1, n):
-            raise ValueError(f"k has {len(self._gains)} slots, the observation has shape {observation.shape}")
+            raise ValueError(f"k has {len(self._gains)} slots, the observation has shape {np.shape(observation)}")
         integral = np.zeros(n) if state is None else array("state[0]", state[0], (n,))
         if episode_start is not None:
             integral[np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), n)] = 0.0
         u = np.empty((n, 1))
         _switch(e, integral, self._gains, self._settings, u)
-        return (u if observation.ndim == 2 else u[0]), (integral,)
+        return (u if np.ndim(observation) == 2 else u[0]), (integral,)
 
     def __repr__(self) -> str:
         settings = {name: getattr(self, name) for name in ("dt", "slope", "Z0", "lam", "epsilon")}

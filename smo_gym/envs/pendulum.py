@@ -7,12 +7,14 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 from gymnasium import logger
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
-from ..validation import unknown
+from ..validation import mapping, short
 from .desired import Desired
 from .rendering import MODES, Renderer, Scene
+from .spec import told
 from .task import HANGING, TRACKING, UPRIGHT, Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
@@ -65,7 +67,8 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
     ## Episode End
 
     Termination: the cart leaves the track (`|h| > track_limit`), the rod falls (`|theta| > angle_limit`; pi/2 upright,
-    no limit hanging) or the state is not finite. Truncation: after `horizon` seconds. Reaching the goal ends nothing.
+    no limit hanging) or the state is not finite any more; the last finite one is then told. Truncation: after `horizon`
+    seconds. Reaching the goal ends nothing.
 
     ## Information
 
@@ -103,12 +106,13 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
     Raises:
         ValueError: an option is unknown or its value is not allowed; an action of another shape or not finite.
         gymnasium.error.ResetNeeded: `step` before `reset` or after the end of an episode; `render` before `reset`.
-        ImportError: a render mode, but pygame-ce is missing.
-        RuntimeError: `"human"`, but there is no display.
+        ImportError: the first frame is to be drawn, but pygame-ce is missing.
+        RuntimeError: the first frame of `"human"` is to be drawn, but there is no display.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": MODES, "render_fps": 50}  # type: ignore[misc]
     defaults: ClassVar[Task] = HANGING
+    _spec: EnvSpec | None = None
 
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
         if render_mode is not None and render_mode not in MODES:
@@ -122,18 +126,24 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         self._stepper = Stepper(self.task)
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._steps_left = 0
-        self._renderer = None if render_mode is None else Renderer(render_mode, self.task)
+        self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
         self._scene: Scene | None = None
         self._ghost: Array | None = None
 
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What :func:`gymnasium.make` was asked for, with the episode's length; all of it fits into JSON."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = told(spec, self.task)
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Draw a plant and an initial state, or take them from ``options``."""
-        options = options or {}
-        for name in options:
-            if name not in RESET_OPTIONS:
-                raise ValueError(unknown("reset option", name, RESET_OPTIONS))
+        asked = self.task.asked(mapping("reset option", options or {}, RESET_OPTIONS))
         super().reset(seed=seed)
-        params, x = self.task.case(self.task.draw(self.np_random), options)
+        params, x = self.task.case(self.np_random, asked)
         self._x, self._params = x[:, None], params[:, None]
         self._steps_left = self._stepper.steps
         samples = np.repeat(x[None, :2], self._stepper.substeps, axis=0)
@@ -144,10 +154,9 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         """Hold the force over one control period."""
         if self._steps_left == 0:
             raise ResetNeeded("the episode has not begun or is over: call reset() before step()")
-        action = np.asarray(action)
-        if action.shape != (1,):
-            raise ValueError(f"action={action!r} has shape {action.shape}, it must have shape (1,)")
-        u = applied_force(action[None], 1, self.task.force_limit)
+        if np.shape(action) != (1,):
+            raise ValueError(f"action={short(action)} has shape {np.shape(action)}, it must have shape (1,)")
+        u = applied_force(np.asarray(action)[None], 1, self.task.force_limit)
         self._steps_left -= 1
         k = self._stepper.steps - self._steps_left
         x_d = _REST if self._desired is None else self._desired.states[k : k + 1]
@@ -162,16 +171,18 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
 
     def render(self) -> Any:
         """The frame of the mode: an array (height, width, 3) or, in a window, None."""
-        if self._renderer is None:
+        if self.render_mode is None:
             logger.warn('render() needs a render mode: gymnasium.make(..., render_mode="rgb_array")')
             return None
         if self._scene is None:
             raise ResetNeeded("the episode has not begun: call reset() before render()")
+        if self._renderer is None:
+            self._renderer = Renderer(self.render_mode, self.task)
         return self._renderer.draw(self._scene, self._ghost)
 
     def show(self, ghost: Array) -> None:
         """Draw an estimate (4,) beside the state; whoever estimates calls it at once and after each estimate."""
-        if self._renderer is None:
+        if self.render_mode is None:
             return
         self._ghost = ghost.copy()
         if self.render_mode == "human" and self._scene is not None:
@@ -183,7 +194,7 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
             self._renderer.close()
 
     def _see(self, k: int, force: float) -> None:
-        if self._renderer is None:
+        if self.render_mode is None:
             return
         x_d = None if self._desired is None else self._desired.states[k]
         self._scene = Scene(k * self.task.control_period, self._x[:, 0].copy(), self._params[2, 0], force, x_d)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..kernels import kernel
 from ..plant import CartPendulum, advance
 from ..reference import Reference, shipped
-from ..validation import array, limit, mapping, multiple, number, unknown
+from ..validation import array, limit, mapping, multiple, number, short, unknown, whole
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -105,8 +106,7 @@ class Task:
             raise ValueError(
                 f"reference was computed for the plant {self.reference.params}, it must be for params={self.params}"
             )
-        if not isinstance(self.preview, int) or self.preview < 0:
-            raise ValueError(f"preview={self.preview!r} must be a whole number of at least 0")
+        set_(self, "preview", whole("preview", self.preview, 0))
         for name in ("force_limit", "track_limit", "angle_limit"):
             set_(self, name, limit(name, getattr(self, name)))
         low, high = self._box()
@@ -156,18 +156,26 @@ class Task:
         low, high = self.initial_state
         return params, rng.uniform(low, high)
 
-    def case(self, drawn: tuple[Array, Array], options: Mapping[str, Any]) -> tuple[Array, Array]:
-        """The plant and initial state of one episode: what was drawn, or what reset options ask for instead.
+    def asked(self, options: Mapping[str, Any]) -> tuple[Array | None, Array | None]:
+        """The plant and initial state that reset options ask for; None for what is to be drawn.
 
         Raises:
             ValueError: an option has a value that is not allowed.
         """
-        params, state = drawn
-        if options.get("params") is not None:
-            params = CartPendulum.of(options["params"], self.params).as_array()
-        if options.get("state") is not None:
-            state = array("options['state']", options["state"], (4,))
-        return params, state
+        params, state = options.get("params"), options.get("state")
+        return (
+            None if params is None else CartPendulum.of(params, self.params).as_array(),
+            None if state is None else array("options['state']", state, (4,)),
+        )
+
+    def case(self, rng: np.random.Generator, asked: tuple[Array | None, Array | None]) -> tuple[Array, Array]:
+        """The plant and initial state of one episode: what is drawn, or what :meth:`asked` says instead."""
+        params, state = self.draw(rng)
+        return params if asked[0] is None else asked[0], state if asked[1] is None else asked[1]
+
+    def as_options(self) -> dict[str, Any]:
+        """The options that make this task, as plain data: what :meth:`of` takes and JSON holds."""
+        return plain_data({f.name: getattr(self, f.name) for f in fields(self)})  # type: ignore[no-any-return]
 
 
 HANGING = Task()
@@ -184,13 +192,29 @@ TRACKING = Task.of({"reference": shipped()}, HANGING)
 """Defaults of SMOPendulumTracking-v0: the article's plant and the reference of its Table 7."""
 
 
+def plain_data(value: Any) -> Any:
+    """The same as numbers, text, lists and mappings: dataclasses by field, arrays as lists, enumerations by value."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain_data(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {name: plain_data(inner) for name, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain_data(inner) for inner in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return value.value if isinstance(value, Enum) else value
+
+
 def applied_force(action: ArrayLike, n: int, bound: float) -> Array:
     """The force in N that the actuator applies, (n,): the actions (n, 1) clipped to its limit.
 
     Raises:
         ValueError: the shape is not (n, 1), or an action is not finite.
     """
-    wanted = np.array(action, dtype=np.float64)  # a copy: the kernel is compiled for plain arrays alone
+    try:
+        wanted = np.array(action, dtype=np.float64)  # a copy: the kernel is compiled for plain arrays alone
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"action={short(action)} must be an array of numbers of shape {(n, 1)}") from None
     if wanted.shape != (n, 1):
         raise ValueError(f"action has shape {wanted.shape}, it must have shape {(n, 1)}")
     u = np.empty(n)
@@ -223,13 +247,20 @@ class Stepper:
     def step(self, x: Array, params: Array, u: Array, x_d: Array) -> tuple[Array, Array, Flags]:
         """Advance the states ``x`` (4, n) in place by one control period that should end at ``x_d`` (n, 4).
 
+        A state that is not finite any more fails, and is told as it was before the period.
+
         Returns:
             The samples (substeps, 2, n), the rewards (n,) and whether the episode failed (n,).
         """
         n = x.shape[1]
         samples, reward, failed = np.empty((self.substeps, 2, n)), np.empty(n), np.empty(n, dtype=np.bool_)
+        before = x.copy()
         advance(x, params, u, self.dt, samples)
         _judge(x, x_d, u, self._settings, reward, failed)
+        if np.count_nonzero(failed):
+            lost = ~np.isfinite(x).all(axis=0)
+            x[:, lost] = before[:, lost]
+            samples[:, :, lost] = before[:2, lost]
         return samples, reward, failed
 
 

@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import numbers
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import numpy as np
+from gymnasium import logger
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from ..validation import mapping
+from ..validation import mapping, short, whole
 from .desired import Desired
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
+from .rendering import Renderer, Scene
+from .spec import told
 from .task import Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
@@ -28,11 +34,12 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
     of slots and threads. Options are those of :class:`~smo_gym.envs.pendulum.PendulumEnv`.
 
     With ``autoreset_mode=DISABLED`` an ended slot holds still (state unchanged, reward 0, its flags stay) until
-    ``reset(options={"reset_mask": mask})`` starts it anew.
+    ``reset(options={"reset_mask": mask})`` starts it anew. The action of an ended slot is ignored in every mode.
 
     Args:
         num_envs: number of slots.
-        render_mode: None.
+        render_mode: None, or "rgb_array": ``render()`` gives one frame a slot.
+        max_episode_steps: control periods in an episode, where fewer than the horizon has.
         autoreset_mode: "NextStep" (default), "SameStep" or "Disabled", or the enumeration's member.
         **options: of the task.
 
@@ -42,23 +49,26 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
     """
 
     scalar: ClassVar[type[PendulumEnv]] = PendulumEnv
+    _spec: EnvSpec | None = None
 
     def __init__(
         self,
         num_envs: int = 1,
         render_mode: str | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
         **options: Any,
     ) -> None:
-        if not isinstance(num_envs, int) or num_envs < 1:
-            raise ValueError(f"num_envs={num_envs!r} must be a positive integer")
-        if render_mode is not None:
-            raise ValueError(f"render_mode={render_mode!r} must be None: a batch is not drawn")
-        self.num_envs = num_envs
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode={render_mode!r} must be None or 'rgb_array': a batch has no window")
+        self.num_envs = num_envs = whole("num_envs", num_envs, 1)
         self.render_mode = render_mode
         self.task = Task.of(options, self.scalar.defaults)
+        if max_episode_steps is not None:
+            steps = min(whole("max_episode_steps", max_episode_steps, 1), self.task.steps)
+            self.task = replace(self.task, horizon=steps * self.task.control_period)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.scalar.metadata, "render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**self.scalar.metadata, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = self.task.observation_space
         self.single_action_space = self.task.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -66,6 +76,9 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         self._stepper = Stepper(self.task)
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._rest = np.zeros((num_envs, 4))
+        self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
+        self._force = np.zeros(num_envs)
+        self._ghosts: Array | None = None
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
         self._x = np.zeros((4, num_envs))
@@ -106,9 +119,9 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         if not self._generators and not mask.all():
             raise ResetNeeded("no episode has begun: the first reset() must be of all slots")
         cut = self._instants(options.pop("steps", self.task.steps))
-        each = self._each(options)
+        asked = [self.task.asked(each) for each in self._each(options)]
         self._seed(seed, mask)
-        self._start(mask, each)
+        self._start(mask, asked)
         self._cut[mask] = cut[mask]
         return self._observation(), self._info(self._still(), np.zeros(self.num_envs))
 
@@ -116,12 +129,13 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         """Hold one force a slot over one control period."""
         if not self._generators:
             raise ResetNeeded("no episode has begun: call reset() before step()")
-        u = applied_force(actions, self.num_envs, self.task.force_limit)
         over = self._terminated | self._truncated
         waiting = np.count_nonzero(over) > 0
         if waiting:
             held = self._x[:, over]
-            u[over] = 0.0
+            if np.shape(actions) == (self.num_envs, 1):  # else the check of the action says so
+                actions = np.where(over[:, None], 0.0, actions)
+        u = applied_force(actions, self.num_envs, self.task.force_limit)
         self._k[~over] += 1
         x_d = self._rest if self._desired is None else self._desired.states[self._k]
         samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
@@ -148,7 +162,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         final_obs = np.full(self.num_envs, None, dtype=object)
         for i in np.flatnonzero(ended):
             final_obs[i] = observation[i].copy()
-        final_info = {key: _only(value, ended) for key, value in final.items()}
+        final_info = {key: only(value, ended) for key, value in final.items()}
         self._start(ended, [])
         samples, force = final["samples"].copy(), final["force"].copy()
         samples[ended] = self._x[:2, ended].T[:, None]
@@ -160,6 +174,38 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             "final_info": final_info,
             "_final_info": ended.copy(),
         }
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What :func:`gymnasium.make_vec` was asked for, with the episodes' length; all of it fits into JSON."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = told(spec, self.task)
+
+    def render(self) -> tuple[Any, ...] | None:
+        """One frame (height, width, 3) a slot, as Gymnasium's vector environments give them; None without a mode."""
+        if self.render_mode is None:
+            logger.warn('render() needs a render mode: gymnasium.make_vec(..., render_mode="rgb_array")')
+            return None
+        if not self._generators:
+            raise ResetNeeded("no episode has begun: call reset() before render()")
+        if self._renderer is None:
+            self._renderer = Renderer(self.render_mode, self.task)
+        x_d = [None] * self.num_envs if self._desired is None else self._desired.states[self._k]
+        return tuple(
+            self._renderer.draw(
+                Scene(k * self.task.control_period, self._x[:, i].copy(), self._params[2, i], self._force[i], x_d[i]),
+                None if self._ghosts is None else self._ghosts[:, i],
+            )
+            for i, k in enumerate(self._k.tolist())
+        )
+
+    def show(self, ghosts: Array) -> None:
+        """Draw estimates (4, n) beside the states; whoever estimates calls it after each estimate."""
+        if self.render_mode is not None:
+            self._ghosts = ghosts.copy()
 
     def _mask(self, mask: Any) -> Flags:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
@@ -177,18 +223,21 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
 
     def _seed(self, seed: int | Sequence[int | None] | None, mask: Flags) -> None:
         n = self.num_envs
-        seeds = [seed + i for i in range(n)] if isinstance(seed, int) else [None] * n if seed is None else list(seed)
-        if len(seeds) != n:
-            raise ValueError(f"seed has {len(seeds)} entries for {n} slots")
+        if seed is None or isinstance(seed, numbers.Integral):
+            seeds = [None if seed is None else int(seed) + i for i in range(n)]
+        elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str) and len(seed) == n:
+            seeds = [None if one is None else whole(f"seed[{i}]", one, 0) for i, one in enumerate(seed)]
+        else:
+            raise ValueError(f"seed={short(seed)} must be None, a whole number, or {n} of these, one a slot")
         fresh = not self._generators
         drawn = [seeding.np_random(s) if fresh or (s is not None and mask[i]) else None for i, s in enumerate(seeds)]
         kept = [None] * n if fresh else list(zip(self._generators, self._seeds, strict=True))
         pairs = [new or old for new, old in zip(drawn, kept, strict=True)]
         self._generators, self._seeds = [pair[0] for pair in pairs if pair], [pair[1] for pair in pairs if pair]
 
-    def _start(self, mask: Flags, each: list[dict[str, Any]]) -> None:
+    def _start(self, mask: Flags, asked: Sequence[tuple[Array | None, Array | None]]) -> None:
         slots = np.flatnonzero(mask)
-        cases = [self.task.case(self.task.draw(self._generators[i]), each[i] if each else {}) for i in slots]
+        cases = [self.task.case(self._generators[i], asked[i] if asked else (None, None)) for i in slots.tolist()]
         for i, (params, x) in zip(slots, cases, strict=True):
             self._params[:, i], self._x[:, i] = params, x
         self._params_told = self._params.T.copy()
@@ -218,6 +267,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         return observation
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
+        self._force = force
         everywhere = self._everywhere
         info = {
             "state": self._x.T.copy(),
@@ -234,7 +284,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         return info
 
 
-def _only(values: Array, slots: Flags) -> Array:
+def only(values: NDArray[Any], slots: Flags) -> NDArray[Any]:
     """The values of some slots, zero (False) elsewhere, as Gymnasium's own vector environments give them."""
     some = np.zeros_like(values)
     some[slots] = values[slots]

@@ -184,7 +184,7 @@ class Lqr:
             self.scenario,
             hypothesis,
             observers,
-            lambda n: LQR(np.repeat(K, n, axis=0)),
+            lambda n: LQR(np.repeat(K, n, axis=0), wrap=False),
             starts,
             model.as_array()[None],
         )
@@ -227,7 +227,9 @@ class Regulation:
         smc_observers, lqr_observers = ([one.observer.build(True)] * len(values) for one in (smc, lqr))
 
         def law(n: int) -> SlidingModeController:
-            return SlidingModeController(np.repeat(values[:, :4], n, axis=0), dt, np.repeat(values[:, 4], n))
+            return SlidingModeController(
+                np.repeat(values[:, :4], n, axis=0), dt, np.repeat(values[:, 4], n), wrap=False
+            )
 
         cases = np.repeat([list(self._cases.values())], len(values), axis=0)
         x0, plants = values[:, None, 5:], _plants(self.table4, 1)
@@ -269,7 +271,7 @@ class Tracking:
             self.scenario,
             hypothesis,
             [settings.observer.build(True)] * len(k),
-            lambda n: SlidingModeController(np.repeat(k, n, axis=0), dt, settings.slope.value),
+            lambda n: SlidingModeController(np.repeat(k, n, axis=0), dt, settings.slope.value, wrap=False),
             np.tile(x0, (len(k), 1, 1)),
             _plants(self.scenario, 4),
         )

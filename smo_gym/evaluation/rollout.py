@@ -67,7 +67,7 @@ class Rollout:
     metrics: dict[str, Array]
     """Metric name (:data:`smo_gym.evaluation.metrics.NAMES`) to values (n,), over each run's own duration."""
     failed: NDArray[np.bool_]
-    """Runs that terminated (off the track, fallen, not finite) or whose estimate diverged, (n,)."""
+    """Runs that terminated (off the track, fallen, not finite) or whose estimate diverged or was lost, (n,)."""
     traces: Traces | None
 
 
@@ -131,6 +131,7 @@ def rollout(
         observation, _, ended, _, info = env.step(action)
         metrics.add(sums, info, estimate(), failed)
         failed = failed | ended.astype(np.bool_, copy=False) | ~(np.abs(observation) < DIVERGED).all(axis=1)
+        failed |= info.get("estimate_failed", False)
         trace.record(k, info, estimate())
         if k % 100 == 0:
             progress(100)

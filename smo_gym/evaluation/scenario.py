@@ -65,11 +65,12 @@ class LqrSettings(_Strict):
 
     law: Literal["lqr"]
     K: Setting[Four]
+    wrap: Setting[bool] = Setting[bool](value=True, source="chosen", note="error of the angle within half a turn")
     observer: ObserverSettings
 
     def build(self, dt: float) -> LQR:
         """The controller."""
-        return LQR(self.K.value)
+        return LQR(self.K.value, self.wrap.value)
 
 
 class SmcSettings(_Strict):
@@ -81,12 +82,13 @@ class SmcSettings(_Strict):
     Z0: Setting[float]
     lam: Setting[float]
     epsilon: Setting[float]
+    wrap: Setting[bool] = Setting[bool](value=True, source="chosen", note="error of the angle within half a turn")
     observer: ObserverSettings
 
     def build(self, dt: float) -> SlidingModeController:
         """The controller for a control period of ``dt`` seconds."""
         return SlidingModeController(
-            self.k.value, dt, self.slope.value, self.Z0.value, self.lam.value, self.epsilon.value
+            self.k.value, dt, self.slope.value, self.Z0.value, self.lam.value, self.epsilon.value, self.wrap.value
         )
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..validation import whole
 from . import inlined
 
 LANES = 64
@@ -68,9 +69,7 @@ def set_threads(threads: int) -> None:
     Raises:
         ValueError: ``threads`` is no positive integer.
     """
-    if not isinstance(threads, int) or threads < 1:
-        raise ValueError(f"threads={threads!r} must be a positive integer")
-    _pool.threads = threads
+    _pool.threads = whole("threads", threads, 1)
     _pool.drop()
 
 

@@ -6,16 +6,11 @@ The polynomials are near-minimax (interpolation at Chebyshev nodes in 50 digits)
 """
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 from numba import types
-from numba.extending import intrinsic as _intrinsic
 
-from . import inlined
-
-# Numba's own types describe the generator, not the function that it makes.
-intrinsic: Callable[[Callable[..., Any]], Callable[..., Any]] = _intrinsic
+from . import inlined, instruction, interpreted
 
 # Adding 1.5 * 2**52 rounds to an integer and leaves that integer in the low bits of the sum.
 _ROUND = 6755399441055744.0
@@ -28,7 +23,7 @@ _TWO_OVER_LN2 = 2.8853900817779268
 _TANH_SATURATED = 20.0
 
 
-@intrinsic
+@instruction(interpreted.fma)
 def fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     """``a * b + c`` with one rounding."""
 
@@ -38,7 +33,7 @@ def fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     return types.float64(types.float64, types.float64, types.float64), codegen
 
 
-@intrinsic
+@instruction(interpreted.bits)
 def _bits(typingctx: Any, x: Any) -> Any:
     """The 64 bits of a float as an integer."""
 
@@ -48,7 +43,7 @@ def _bits(typingctx: Any, x: Any) -> Any:
     return types.int64(types.float64), codegen
 
 
-@intrinsic
+@instruction(interpreted.from_bits)
 def _from_bits(typingctx: Any, n: Any) -> Any:
     """The float whose 64 bits are the integer's."""
 

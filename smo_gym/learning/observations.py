@@ -45,8 +45,7 @@ class Kind:
 
 
 LIMIT = 10.0
-"""Where scaled observations are clipped (chosen). An estimate that has diverged to NaN, as it may when a rod spins too
-fast for the observer's gains, is told as this limit."""
+"""Where scaled observations are clipped (chosen)."""
 
 # The slopes are those that the article's LQR tables identify (configs/article.yaml), the gains Table 3's.
 _SMO = {"observer": "smo", "gains": "lqr", "slopes": (12.5, 12.5)}
@@ -87,7 +86,7 @@ def agent_view(env: gymnasium.Env[Array, Array], observation: str = "smo") -> gy
             whose observation is otherwise changed.
     """
     kind = KINDS[choice("observation", observation, KINDS)]
-    task_of(env)
+    task_of(env, batch=False)
     view: gymnasium.Env[Any, Any] = ScaleWrapper(ObserverWrapper(env, **kind.observer) if kind.observer else env)
     if kind.frames == 1:
         return view
@@ -134,7 +133,7 @@ class VectorAgentView(VectorWrapper[Single, Array, Array, Array, Array]):
 
     def __init__(self, env: VectorEnv[Array, Array, Array], observation: str = "smo") -> None:
         self.kind = KINDS[choice("observation", observation, KINDS)]
-        task_of(env)
+        task_of(env, batch=True)
         self._force = _bounded(env.single_action_space)
         super().__init__(VectorObserverWrapper(env, **self.kind.observer) if self.kind.observer else env)
         self._units = units(self.env.single_observation_space.shape[0])  # type: ignore[index]
@@ -148,8 +147,8 @@ class VectorAgentView(VectorWrapper[Single, Array, Array, Array, Array]):
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Single, dict[str, Any]]:
         """Start the episodes."""
-        started = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         observation, info = self.env.reset(seed=seed, options=options)
+        started = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         self._frames[started] = scaled(observation, self._units)[started, None]
         self._over[started] = False
         return self._told(), info

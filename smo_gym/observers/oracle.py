@@ -22,10 +22,14 @@ class Oracle:
 
 class _Truth:
     def __init__(self, n: int) -> None:
-        self.xhat = np.zeros((4, n))
+        self._x = np.zeros((4, n))
+
+    @property
+    def xhat(self) -> Array:
+        return self._x.copy()
 
     def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:
-        self.xhat[:, slots] = truth[:, slots]
+        self._x[:, slots] = truth[:, slots]
 
     def update(self, period: Period) -> None:
-        self.xhat = period.truth.copy()
+        self._x = period.truth.copy()

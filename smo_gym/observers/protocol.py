@@ -28,7 +28,7 @@ class Estimator(Protocol):
 
     @property
     def xhat(self) -> Array:
-        """The estimates [h, theta, h', theta'], (4, n)."""
+        """The estimates [h, theta, h', theta'], (4, n), a copy."""
         ...
 
     def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:

@@ -213,7 +213,7 @@ class _Bank:
 
     @property
     def xhat(self) -> Array:
-        return self._state[:4]
+        return self._state[:4].copy()
 
     def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:
         self._state[:, slots] = self._initial[:, slots]

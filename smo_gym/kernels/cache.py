@@ -1,0 +1,61 @@
+"""Numba's cache on disk, which may save time and never be the reason of a failure or of stale physics."""
+
+import contextlib
+import hashlib
+import warnings
+from pathlib import Path
+from typing import Any
+
+from numba.core.caching import FunctionCache
+
+
+def _digest() -> str:
+    """Hash of all sources that other files' kernels inline."""
+    sources = sorted(Path(__file__).parent.glob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
+
+
+_SOURCES = _digest()
+_warned: set[str] = set()
+
+
+def warn_once(error: Exception) -> None:
+    """Say, once a process, that kernels are compiled anew although they should be cached."""
+    if not _warned:
+        _warned.add(str(error))
+        warnings.warn(
+            f"compiled kernels cannot be cached or read back ({type(error).__name__}: {error}); they are compiled in "
+            "memory, some seconds in every process. NUMBA_CACHE_DIR names another folder",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+
+
+class Cache(FunctionCache):
+    """A kernel's cache, stamped with the sources of this package too; what is damaged is made anew.
+
+    Numba recompiles when the kernel's own file changes but does not see a change in what the kernel inlines.
+    """
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        index = self._cache_file
+        index._source_stamp = (index._source_stamp, _SOURCES)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled kernel, or None where there is none that can be read."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception as error:  # a file that is cut, empty or closed to us
+            warn_once(error)
+            with contextlib.suppress(Exception):
+                # else a damaged index stands in the way of all later processes
+                self.flush()  # type: ignore[no-untyped-call]
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep the compiled kernel, where there is room for it."""
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        except Exception as error:
+            warn_once(error)

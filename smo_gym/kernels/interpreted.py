@@ -1,0 +1,33 @@
+"""What the machine's instructions do, in Python: used where nothing is compiled (``NUMBA_DISABLE_JIT=1``)."""
+
+import math
+import struct
+from fractions import Fraction
+
+_INT64 = struct.Struct("<q")
+_FLOAT64 = struct.Struct("<d")
+_MASK = 2**64 - 1
+
+
+def fma(a: float, b: float, c: float) -> float:
+    """``a * b + c`` with one rounding, from exact fractions."""
+    a, b, c = float(a), float(b), float(c)
+    if not (math.isfinite(a) and math.isfinite(b) and math.isfinite(c)):
+        return a * b + c
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    if not exact:
+        return a * b + c  # the sign of a zero
+    try:
+        return float(exact)
+    except OverflowError:
+        return math.copysign(math.inf, exact)
+
+
+def bits(x: float) -> int:
+    """The 64 bits of a float as an integer."""
+    return int(_INT64.unpack(_FLOAT64.pack(x))[0])
+
+
+def from_bits(n: int) -> float:
+    """The float whose 64 bits are the integer's low ones."""
+    return float(_FLOAT64.unpack((n & _MASK).to_bytes(8, "little"))[0])
