@@ -172,9 +172,9 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
         compensation: bool | None = None,
         **settings: Any,
     ) -> None:
+        task = task_of(env, batch=False)
         RecordConstructorArgs.__init__(self, **_named(observer, compensation, settings))
         gymnasium.Wrapper.__init__(self, env)
-        task = task_of(env, batch=False)
         self.observer = make_observer(observer, compensation, settings)
         self._estimator = self.observer.start(1, task.dt, _force(task), task.params)
         self._every = np.ones(1, dtype=np.bool_)
@@ -233,9 +233,9 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         compensation: bool | None = None,
         **settings: Any,
     ) -> None:
+        task = task_of(env, batch=True)
         RecordConstructorArgs.__init__(self, **_named(observer, compensation, settings))
         VectorWrapper.__init__(self, env)
-        task = task_of(env, batch=True)
         n, plant = env.num_envs, (task.dt, _force(task), task.params)
         if isinstance(observer, Sequence) and not isinstance(observer, str):
             if settings or compensation is not None:

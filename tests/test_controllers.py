@@ -131,3 +131,54 @@ def test_stable_baselines3_evaluates_a_law(law):
 def test_bad_settings_are_named(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+@pytest.mark.parametrize("gravity", [-9.8, 9.8])
+@pytest.mark.parametrize("Q", [[0, 1, 0, 1], [0, 1, 1, 1], [0, 0, 0, 0], [0, 0, 1, 0]])
+def test_weights_that_stabilise_nothing_are_named(gravity, Q):
+    with pytest.raises(ValueError, match=r"Q=\[0, .* without asymptotic stability"):
+        LQR.design(Q, 1.0, CartPendulum(gravity=gravity))
+
+
+@pytest.mark.parametrize("Q", [[1e-5, 0, 0, 0], [1, 1, 0, 0], [1e9, 1e9, 1e9, 1e9]])
+def test_weights_that_stabilise_are_taken(Q):
+    for gravity in (-9.8, 9.8):
+        model = CartPendulum(gravity=gravity)
+        A, B = model.linearise()
+        assert np.linalg.eigvals(A - B @ LQR.design(Q, 1.0, model).K).real.max() < 0.0
+
+
+def test_R_may_be_an_array_and_the_model_an_environment():
+    upright = gymnasium.make("SMOPendulumUpright-v0")
+    K = LQR.design(np.eye(4), [[1.0]], upright).K
+    assert np.array_equal(K, LQR.design(np.eye(4), 1.0, CartPendulum(gravity=9.8)).K)
+    assert np.array_equal(K, LQR.design(np.eye(4), 1.0, gymnasium.make_vec("SMOPendulumUpright-v0", 2)).K)
+    with pytest.raises(ValueError, match="model='abc' must be a CartPendulum or a smo_gym environment"):
+        LQR.design(np.eye(4), 1.0, "abc")
+    with pytest.raises(ValueError, match=r"R=\[1.0, 2.0\] must be a positive number"):
+        LQR.design(np.eye(4), [1.0, 2.0])
+
+
+@pytest.mark.parametrize("turns", [-2, 1, 3])
+def test_a_rod_that_has_turned_rests_where_it_is(turns):
+    """The encoder counts on, the error does not; the article's laws, wrap=False, unwind the rod."""
+    turned = np.array([0.0, 2 * np.pi * turns, 0.0, 2 * np.pi * turns, 0.0, 0.0])
+    for law in (LQR([1.0, 2.0, 3.0, 4.0]), SlidingModeController([1.0, 2.0, 3.0, 4.0], 0.001, 30.0)):
+        assert abs(law.predict(turned)[0][0]) < 1e-10
+    assert LQR([1.0, 2.0, 3.0, 4.0], wrap=False).predict(turned)[0][0] == -4 * np.pi * turns
+
+
+def test_within_half_a_turn_wrapping_changes_no_bit():
+    observation = np.random.default_rng(0).uniform(-3.1, 3.1, (200, 6))
+    for make in (
+        lambda wrap: LQR([1.0, 2.0, 3.0, 4.0], wrap),
+        lambda wrap: SlidingModeController([1, 2, 3, 4], 0.001, 30.0, wrap=wrap),
+    ):
+        assert np.array_equal(make(True).predict(observation)[0], make(False).predict(observation)[0])
+
+
+def test_lists_are_taken_and_other_types_are_named():
+    law = LQR([1.0, 2.0, 3.0, 4.0])
+    assert np.array_equal(law.predict([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])[0], [-10.0])
+    with pytest.raises(ValueError, match="observation='abc' must be an array of numbers"):
+        law.predict("abc")

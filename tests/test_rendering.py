@@ -205,7 +205,8 @@ def python(code, **environment):
 
 def test_no_display_is_needed_or_it_is_said():
     make = 'gymnasium.make("SMOPendulum-v0", render_mode={!r})'
-    done = python(f"env = {make.format('human')}")
+    done = python(f"env = {make.format('human')}\nprint('made')\nenv.reset()")
+    assert done.stdout == "made\n"
     assert "RuntimeError: render_mode='human' needs a display" in done.stderr
     assert "use render_mode='rgb_array'" in done.stderr
     done = python(
@@ -217,9 +218,11 @@ def test_no_display_is_needed_or_it_is_said():
 
 def test_a_missing_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
+    env = gymnasium.make("SMOPendulum-v0", render_mode="rgb_array")  # as make_vec_env of Stable-Baselines3 asks for
+    env.reset()
+    env.step(np.zeros(1))
     with pytest.raises(ImportError, match=r'pip install "smo_gym\[render\]"'):
-        gymnasium.make("SMOPendulum-v0", render_mode="rgb_array")
-    gymnasium.make("SMOPendulum-v0").reset()
+        env.render()
 
 
 def test_rendering_without_a_mode_or_an_episode_is_refused():
@@ -249,3 +252,30 @@ def test_an_animation_is_written(tmp_path, capsys):
 def test_smo_gym_does_not_import_pygame_by_itself():
     assert python("import sys\nassert 'pygame' not in sys.modules").returncode == 0
     assert smo_gym.__version__
+
+
+def test_a_batch_is_drawn_slot_by_slot_as_its_scalar_environments_are(make_vec):
+    envs = smo_gym.VectorObserverWrapper(make_vec(2, render_mode="rgb_array"))
+    envs.reset(seed=3)
+    for _ in range(5):
+        envs.step(np.full((2, 1), 20.0))
+    frames = envs.render()
+    for i, frame in enumerate(frames):
+        env = smo_gym.ObserverWrapper(gymnasium.make("SMOPendulum-v0", render_mode="rgb_array"))
+        env.reset(seed=3 + i)
+        for _ in range(5):
+            env.step(np.full(1, 20.0))
+        assert np.array_equal(frame, env.render())
+    with pytest.raises(ValueError, match="a batch has no window"):
+        make_vec(2, render_mode="human")
+
+
+def test_a_batch_makes_a_video(make_vec, tmp_path):
+    envs = gymnasium.wrappers.vector.RecordVideo(
+        make_vec(2, render_mode="rgb_array", horizon=0.1), str(tmp_path / "videos"), episode_trigger=lambda k: True
+    )
+    envs.reset(seed=0)
+    for _ in range(6):
+        envs.step(np.zeros((2, 1)))
+    envs.close()
+    assert [path.suffix for path in (tmp_path / "videos").iterdir()]

@@ -11,7 +11,9 @@ from conftest import assert_same
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
+import smo_gym
 from smo_gym import ObserverWrapper, VectorObserverWrapper
+from smo_gym.envs.task import Reward
 from smo_gym.learning.observations import VectorAgentView
 
 SHORT = {"horizon": 0.1, "angle_limit": None, "track_limit": None}
@@ -219,7 +221,100 @@ def test_bad_masks_and_seeds_are_named(make_vec):
             env.reset(options={"reset_mask": mask})
     with pytest.raises(ValueError, match="at least one slot"):
         env.reset(options={"reset_mask": np.zeros(2, dtype=bool)})
-    with pytest.raises(ValueError, match="seed has 3 entries for 2 slots"):
+    with pytest.raises(ValueError, match=r"seed=\[1, 2, 3\] must be None, a whole number, or 2 of these"):
         env.reset(seed=[1, 2, 3])
     with pytest.raises(ValueError, match="num_envs=0 must be a positive integer"):
         make_vec(0)
+
+
+def test_max_episode_steps_ends_the_episodes_as_in_gymnasiums_own(make_vec):
+    env = make_vec(2, max_episode_steps=3)
+    env.reset(seed=0)
+    assert [env.step(np.zeros((2, 1)))[3].tolist() for _ in range(3)] == [[False] * 2] * 2 + [[True] * 2]
+    assert env.spec.max_episode_steps == 3
+    assert make_vec(2, max_episode_steps=10**6).spec.max_episode_steps == 1750  # the horizon ends it first
+    with pytest.raises(ValueError, match="max_episode_steps=0 must be a positive integer"):
+        make_vec(2, max_episode_steps=0)
+
+
+def test_a_spec_tells_the_length_of_an_episode_and_survives_json():
+    options = {
+        "initial_state": np.zeros(4),
+        "params": smo_gym.CartPendulum(cart_mass=2.0),
+        "horizon": np.float64(2.0),
+        "reward": Reward(r=0.0),
+    }
+    env = gymnasium.make("SMOPendulum-v0", **options)
+    assert env.spec.max_episode_steps == 100
+    again = gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.task == env.unwrapped.task
+    envs = gymnasium.make_vec("SMOPendulum-v0", 2, autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP, **options)
+    assert envs.spec.max_episode_steps == 100
+    again = gymnasium.make_vec(gymnasium.envs.registration.EnvSpec.from_json(envs.spec.to_json()))
+    assert again.unwrapped.task == envs.unwrapped.task
+    assert again.metadata["autoreset_mode"] is gymnasium.vector.AutoresetMode.SAME_STEP
+    wrapped = smo_gym.ObserverWrapper(env, gains={name: np.ones(2) for name in ("m1", "beta_1", "beta_2")})
+    gymnasium.make(gymnasium.envs.registration.EnvSpec.from_json(wrapped.spec.to_json()))
+
+
+def test_the_action_of_an_ended_slot_does_not_stop_the_batch(make_vec):
+    for mode in ("NextStep", "Disabled"):
+        env = make_vec(2, autoreset_mode=mode, track_limit=1.0)
+        env.reset(options={"state": np.array([[0.999, 0, 50.0, 0], [0, 0, 0, 0]])})
+        _, _, terminated, _, _ = env.step(np.zeros((2, 1)))
+        assert terminated.tolist() == [True, False]
+        env.step(np.array([[np.nan], [1.0]]))
+    env.reset(options={"state": np.zeros(4)})
+    with pytest.raises(ValueError, match=r"action=nan \(slot 1\) must be finite"):
+        env.step(np.array([[0.0], [np.nan]]))
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        {"options": {"state": [np.nan] * 4}},
+        {"options": {"params": {"cart_mas": 1.0}}},
+        {"seed": 7, "options": {"params": {"cart_mas": 1.0}}},
+        {"seed": 7, "options": {"steps": 0}},
+        {"seed": -7},
+        {"seed": [1, "2"]},
+        {"seed": "ab"},
+    ],
+)
+def test_a_reset_that_raised_changes_nothing(make_vec, bad):
+    def episode(fail):
+        env = make_vec(2)
+        if fail:
+            with pytest.raises((ValueError, gymnasium.error.Error)):
+                env.reset(**bad)
+            with pytest.raises(ResetNeeded):
+                env.step(np.zeros((2, 1)))
+        env.reset(seed=np.int64(0))
+        env.step(np.ones((2, 1)))
+        if fail:
+            with pytest.raises((ValueError, gymnasium.error.Error)):
+                env.reset(**bad)
+        assert env.np_random_seed == (0, 1)
+        return env.step(np.ones((2, 1)))[0], env.reset()[0]
+
+    for a, b in zip(episode(False), episode(True), strict=True):
+        assert np.array_equal(a, b)
+
+
+def test_a_scalar_reset_that_raised_changes_nothing():
+    env = gymnasium.make("SMOPendulum-v0").unwrapped
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"options\['state'\]"):
+        env.reset(seed=7, options={"state": [np.nan] * 4})
+    other = gymnasium.make("SMOPendulum-v0").unwrapped
+    other.reset(seed=0)
+    assert np.array_equal(env.step(np.ones(1))[0], other.step(np.ones(1))[0])
+    assert np.array_equal(env.reset()[0], other.reset()[0])
+
+
+def test_an_action_of_another_type_is_named(make_vec):
+    env = make_vec(2)
+    env.reset()
+    for action in ("abc", [[1j], [0]], [["a"], ["b"]], {}):
+        with pytest.raises(ValueError, match="action"):
+            env.step(action)

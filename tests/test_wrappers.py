@@ -1,10 +1,21 @@
 """The observer wrappers: what they append and what they refuse. tests/test_envs.py compares scalar with vector."""
 
+import importlib.util
+import sys
+from pathlib import Path
+
 import gymnasium
 import numpy as np
 import pytest
 
 from smo_gym import CartPendulum, ObserverWrapper, Oracle, SlidingModeObserver, VectorObserverWrapper
+
+spec = importlib.util.spec_from_file_location(
+    "extremes", Path(__file__).resolve().parent.parent / "benchmarks" / "extremes.py"
+)
+extremes = importlib.util.module_from_spec(spec)
+sys.modules["extremes"] = extremes  # its dataclass looks its module up
+spec.loader.exec_module(extremes)
 
 
 def test_the_observation_is_measurement_then_estimate(env_id):
@@ -123,12 +134,109 @@ def test_refusals(make_vec):
         VectorObserverWrapper(gymnasium.vector.SyncVectorEnv(different))
 
 
-def test_the_measurement_comes_from_the_encoders_whatever_stands_between():
+class _Shaken(gymnasium.Wrapper):
+    """Noise in what is observed, by a wrapper that does not say that it is one of observations."""
+
+    def step(self, action):
+        observation, *rest = self.env.step(action)
+        return observation + 0.01, *rest
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda env: gymnasium.wrappers.TransformObservation(env, lambda y: y + 0.5, env.observation_space),
+        lambda env: gymnasium.wrappers.DelayObservation(env, 10),
+        lambda env: gymnasium.wrappers.OrderEnforcing(gymnasium.wrappers.RescaleObservation(env, -1.0, 1.0)),
+    ],
+)
+def test_measurements_that_an_observer_would_not_see_are_refused(change):
     env = gymnasium.make("SMOPendulum-v0")
-    scaled = gymnasium.wrappers.TransformObservation(env, lambda y: 10.0 * y, env.observation_space)
+    env.unwrapped.observation_space = gymnasium.spaces.Box(-9.0, 9.0, (2,), np.float64)
+    with pytest.raises(ValueError, match=r"would not see this\. Noise, quantisation or delay"):
+        ObserverWrapper(change(env))
+
+
+def test_measurements_changed_by_any_wrapper_are_refused_when_they_differ(make_vec):
+    env = ObserverWrapper(_Shaken(gymnasium.make("SMOPendulum-v0")))
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"observes .* where .* was measured: an observer reads"):
+        env.step(np.zeros(1))
+    envs = VectorObserverWrapper(
+        gymnasium.vector.SyncVectorEnv([lambda: _Shaken(gymnasium.make("SMOPendulum-v0"))] * 2)
+    )
+    envs.reset(seed=0)
+    with pytest.raises(ValueError, match="was measured"):
+        envs.step(np.zeros((2, 1)))
+
+
+def test_noise_in_samples_and_observation_alike_reaches_the_observer():
+    class Noisy(gymnasium.Wrapper):
+        def step(self, action):
+            observation, reward, terminated, truncated, info = self.env.step(action)
+            info["samples"] = info["samples"] + 0.1
+            return np.concatenate([info["samples"][-1], observation[2:]]), reward, terminated, truncated, info
+
     estimates = []
-    for inner in (env, scaled):
-        wrapped = ObserverWrapper(inner)
-        wrapped.reset(seed=0)
-        estimates.append([wrapped.step(np.ones(1))[0][2:] for _ in range(3)])
-    assert np.array_equal(*estimates)
+    for inner in (lambda env: env, Noisy):
+        env = ObserverWrapper(inner(gymnasium.make("SMOPendulum-v0")))
+        env.reset(seed=0)
+        estimates.append(env.step(np.zeros(1))[0][2:])
+    assert (estimates[0] != estimates[1]).any()
+
+
+def _until_lost(env, state, force):
+    """Steps until an estimate is lost, with every observation seen to be in its space."""
+    env.reset(seed=0, options={"state": state})
+    for _ in range(500):
+        observation, _, terminated, _, info = env.step(force)
+        assert env.observation_space.contains(observation)
+        if np.any(info["estimate_failed"]) or np.all(terminated):
+            return observation, info
+    raise AssertionError("no estimate was lost")
+
+
+def test_an_estimate_that_is_lost_starts_anew_and_says_so(make_vec):
+    # a spinning rod: h' of the estimate grows with theta'^2, and (35) has no bound for it
+    settings = {"beta_1": [0.0, 0.0], "beta_2": [0.0, 0.0], "m1": [2.0, 2.0]}
+    state, options = [0.0, 0.0, 0.0, 60.0], {"track_limit": None, "force_limit": None}
+    one = ObserverWrapper(gymnasium.make("SMOPendulum-v0", **options), gains=settings, xhat0=[0, 0, 0, 1e160])
+    observation, info = _until_lost(one, state, np.zeros(1))
+    assert info["estimate_failed"] is True
+    assert np.array_equal(observation[2:], [0, 0, 0, 1e160])
+    many = VectorObserverWrapper(make_vec(3, **options), gains=settings, xhat0=[0, 0, 0, 1e160])
+    observations, infos = _until_lost(many, state, np.zeros((3, 1)))
+    assert infos["estimate_failed"].all()
+    assert np.array_equal(observations[:, 2:], [[0, 0, 0, 1e160]] * 3)
+    _, infos = many.reset()
+    assert not infos["estimate_failed"].any()
+
+
+def test_random_plants_starts_gains_and_forces_never_leave_the_observation_space():
+    found = extremes.tried(runs=512, periods=40, seed=0)
+    assert found.unflagged == 0
+    assert found.lost > 0  # else this shows nothing
+
+
+def test_a_wrapper_names_its_twin(make_vec):
+    with pytest.raises(TypeError, match="is a batch: wrap it in VectorObserverWrapper"):
+        ObserverWrapper(make_vec(2))
+    with pytest.raises(TypeError, match="is one environment: wrap it in ObserverWrapper"):
+        VectorObserverWrapper(gymnasium.make("SMOPendulum-v0"))
+
+
+def test_nothing_that_is_handed_out_is_the_observers_own_memory(make_vec):
+    def episode(meddle):
+        env = ObserverWrapper(gymnasium.make("SMOPendulum-v0"))
+        observation, info = env.reset(seed=0)
+        for _ in range(3):
+            if meddle:
+                observation[:] = 99.0
+                env._estimator.xhat[:] = 99.0
+                for value in info.values():
+                    if isinstance(value, np.ndarray):
+                        value[...] = 99.0
+            observation, *_, info = env.step(np.ones(1))
+        return observation
+
+    assert np.array_equal(episode(False), episode(True))

@@ -225,10 +225,11 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         n = self.num_envs
         if seed is None or isinstance(seed, numbers.Integral):
             seeds = [None if seed is None else int(seed) + i for i in range(n)]
-        elif isinstance(seed, Sequence | np.ndarray) and not isinstance(seed, str) and len(seed) == n:
-            seeds = [None if one is None else whole(f"seed[{i}]", one, 0) for i, one in enumerate(seed)]
         else:
-            raise ValueError(f"seed={short(seed)} must be None, a whole number, or {n} of these, one a slot")
+            each = list(seed) if isinstance(seed, Sequence | np.ndarray) else []
+            if len(each) != n or not all(one is None or isinstance(one, numbers.Integral) for one in each):
+                raise ValueError(f"seed={short(seed)} must be None, a whole number, or {n} of these, one a slot")
+            seeds = [None if one is None else int(one) for one in each]
         fresh = not self._generators
         drawn = [seeding.np_random(s) if fresh or (s is not None and mask[i]) else None for i, s in enumerate(seeds)]
         kept = [None] * n if fresh else list(zip(self._generators, self._seeds, strict=True))

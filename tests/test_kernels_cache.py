@@ -1,0 +1,88 @@
+"""Kernels in processes of their own: stale, damaged and missing caches, no compiler, a processor without FMA."""
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import smo_gym
+
+_ROOT = str(Path(smo_gym.__file__).parent.parent)
+_PROBE = """
+import numpy as np
+from smo_gym.plant import CartPendulum, advance
+x = np.array([[0.0], [1.0], [0.0], [0.0]])
+advance(x, CartPendulum().as_array()[:, None], np.zeros(1), 0.001, np.empty((10, 2, 1)))
+print(repr(float(x[3, 0])))
+"""
+
+
+def _probe(cwd, **environment):
+    """The probe in a process of its own, whatever this one's surroundings say of Numba."""
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    command = [sys.executable, "-c", _PROBE]
+    return subprocess.run(command, cwd=cwd, check=True, capture_output=True, text=True, env=kept | environment)
+
+
+def test_a_change_of_the_equations_is_never_hidden_by_the_cache(tmp_path):
+    shutil.copytree(Path(smo_gym.__file__).parent, tmp_path / "smo_gym", ignore=shutil.ignore_patterns("__pycache__"))
+
+    def run():
+        return _probe(tmp_path).stdout
+
+    before = run()
+    assert list((tmp_path / "smo_gym" / "__pycache__").glob("plant._advance*.nbc"))
+    assert run() == before
+    equations = tmp_path / "smo_gym" / "kernels" / "cart_pendulum.py"
+    changed = equations.read_text().replace("(M_c + m) * g * sin", "(M_c + 2 * m) * g * sin")
+    assert changed != equations.read_text()
+    equations.write_text(changed)
+    assert run() != before
+
+
+def _package(folder):
+    """A copy of the package, with a cache of its own."""
+    shutil.copytree(Path(smo_gym.__file__).parent, folder / "smo_gym", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: b"\0" * 99])
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+def test_a_damaged_cache_is_said_once_and_mended(tmp_path, damage, kind):
+    folder, cache = _package(tmp_path), tmp_path / "cache"
+    place = {"NUMBA_CACHE_DIR": str(cache)}
+    whole = _probe(folder, **place)
+    assert whole.stderr == ""
+    files = list(cache.rglob(f"*.{kind}"))
+    assert files
+    for file in files:
+        file.write_bytes(damage(file.read_bytes()))
+    damaged = _probe(folder, **place)
+    assert damaged.stdout == whole.stdout
+    assert damaged.stderr.count("compiled kernels cannot be cached or read back") == 1
+    again = _probe(folder, **place)
+    assert (again.stdout, again.stderr) == (whole.stdout, "")
+
+
+def test_a_cache_that_cannot_be_written_is_no_failure(tmp_path):
+    folder = _package(tmp_path)
+    (tmp_path / "file").write_text("")
+    done = _probe(folder, NUMBA_CACHE_DIR=str(tmp_path / "file" / "cache"))
+    assert done.stdout == _probe(folder, NUMBA_CACHE_DIR=str(tmp_path / "cache")).stdout
+    assert done.stderr.count("compiled kernels cannot be cached") <= 1  # none where Numba finds another folder
+
+
+def test_without_a_compiler_the_bits_are_the_same(tmp_path):
+    assert _probe(tmp_path, NUMBA_DISABLE_JIT="1", PYTHONPATH=_ROOT).stdout == _probe(tmp_path, PYTHONPATH=_ROOT).stdout
+
+
+def test_a_processor_without_fma_is_named(tmp_path):
+    place = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": _ROOT}
+    done = _probe(tmp_path, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="", **place)
+    assert done.stdout == _probe(tmp_path, **place).stdout
+    if platform.machine().lower() in ("x86_64", "amd64"):
+        assert done.stderr.count("no fused multiply-add") == 1
