@@ -271,6 +271,7 @@ def test_a_batch_is_drawn_slot_by_slot_as_its_scalar_environments_are(make_vec):
 
 
 def test_a_batch_makes_a_video(make_vec, tmp_path):
+    pytest.importorskip("moviepy")
     envs = gymnasium.wrappers.vector.RecordVideo(
         make_vec(2, render_mode="rgb_array", horizon=0.1), str(tmp_path / "videos"), episode_trigger=lambda k: True
     )

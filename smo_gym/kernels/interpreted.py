@@ -12,7 +12,9 @@ _MASK = 2**64 - 1
 def fma(a: float, b: float, c: float) -> float:
     """``a * b + c`` with one rounding, from exact fractions."""
     a, b, c = float(a), float(b), float(c)
-    if not (math.isfinite(a) and math.isfinite(b) and math.isfinite(c)):
+    if not math.isfinite(c) and math.isfinite(a) and math.isfinite(b):
+        return c  # whatever a * b overflows to
+    if not (math.isfinite(a) and math.isfinite(b)):
         return a * b + c
     exact = Fraction(a) * Fraction(b) + Fraction(c)
     if not exact:
@@ -20,7 +22,7 @@ def fma(a: float, b: float, c: float) -> float:
     try:
         return float(exact)
     except OverflowError:
-        return math.copysign(math.inf, exact)
+        return math.inf if exact > 0 else -math.inf
 
 
 def bits(x: float) -> int:

@@ -1,0 +1,22 @@
+"""The versions that pyproject.toml allows are those that continuous integration tries."""
+
+import re
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+EXTRAS = ("rl", "render", "plots", "report", "reference")
+
+
+def test_the_lowest_versions_that_are_tried_are_the_lowest_that_are_allowed():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [*project["dependencies"], *(line for extra in EXTRAS for line in project["optional-dependencies"][extra])]
+    lowest = dict(re.match(r"([\w.-]+)>=([\w.]+)", line).groups() for line in wanted)
+    del lowest["torch"]  # its CPU build is pinned
+    lines = (ROOT / ".ci" / "lowest.txt").read_text().splitlines()
+    tried = dict(line.split("==") for line in lines if not line.startswith("#"))
+
+    def number(version):
+        return [int(part) for part in version.removesuffix(".0").removesuffix(".0").split(".")]
+
+    assert {name: number(v) for name, v in lowest.items()} == {name: number(v) for name, v in tried.items()}
