@@ -114,4 +114,4 @@ def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
 def test_bad_arguments_are_named(tmp_path):
     done = subprocess.run(identify(tmp_path, "--generations", "0"), capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert "--generations must be at least 1" in done.stderr
+    assert "--generations: '0' must be a whole number of at least 1" in done.stderr
