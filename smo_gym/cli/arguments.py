@@ -40,8 +40,8 @@ class Parser(argparse.ArgumentParser):
 
 class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        found = "\n".join(f"{name} {version}" for name, version in versions().items())
-        parser.exit(message=f"{found}\n")
+        print("\n".join(f"{name} {version}" for name, version in versions().items()))
+        parser.exit()
 
 
 def versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
