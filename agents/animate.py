@@ -7,7 +7,11 @@ The plant is drawn at random, and no force is beyond 30 N.
 
 from __future__ import annotations
 
-import argparse
+if __name__ == "__main__":  # before the imports below, which take seconds
+    from _starting import begin
+
+    begin()
+
 import io
 import sys
 from collections.abc import Sequence
@@ -19,6 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smo_gym
+from smo_gym.cli.arguments import Parser, real, whole
+from smo_gym.cli.entry import command
 from smo_gym.evaluation import files, scenario
 from smo_gym.validation import number, unknown
 
@@ -28,39 +34,29 @@ FORMATS = {".gif": "GIF", ".webp": "WEBP"}
 FRAME = 0.04  # s between two frames, at least
 
 
+@command("animate.py")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Write the animation; 0 when all went well, 2 for a bad argument or a missing extra, 130 when interrupted."""
     one = scenario.load(CONFIG)
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--controller", default="lqr", help="lqr (default) or smc")
     add("--case", default="1", help="initial state of Table 5: 1 (default), 2, 3 or 4")
-    add("--seconds", type=float, default=6.0, help="length of the run (default 6)")
-    add("--seed", type=int, default=0, help="of the random plant (default 0)")
+    add("--seconds", type=real, default=6.0, help="length of the run (default 6)")
+    add("--seed", type=whole(0), default=0, help="of the random plant (default 0)")
     add("--out", type=Path, default=Path("animation.gif"), metavar="FILE", help=".gif or .webp (default animation.gif)")
     args = parser.parse_args(arguments)
-    try:
-        for what, name, known in (
-            ("controller", args.controller, one.controllers),
-            ("case", args.case, one.initial_states.value),
-            ("kind of file", args.out.suffix, FORMATS),
-        ):
-            if name not in known:
-                raise ValueError(unknown(what, name, known))
-        if args.seed < 0:
-            raise ValueError(f"--seed {args.seed} must be at least 0")
-        number("--seconds", args.seconds, above=FRAME, below=60.0)
-        files.prepare(args.out.parent)
-        frames = record(one, args.controller, args.case, args.seconds, args.seed)
-        files.write_bytes(args.out, encode(frames, FORMATS[args.out.suffix]))
-    except (ValueError, ImportError) as error:
-        print(f"animate.py: error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("animate.py: interrupted, nothing was written", file=sys.stderr)
-        return 130
+    for what, name, known in (
+        ("controller", args.controller, one.controllers),
+        ("case", args.case, one.initial_states.value),
+        ("kind of file", args.out.suffix, FORMATS),
+    ):
+        if name not in known:
+            raise ValueError(unknown(what, name, known))
+    number("--seconds", args.seconds, above=FRAME, below=60.0)
+    files.prepare(args.out.parent, names=[args.out.name])
+    frames = record(one, args.controller, args.case, args.seconds, args.seed)
+    files.write_bytes(args.out, encode(frames, FORMATS[args.out.suffix]))
     print(f"{len(frames)} frames, {args.out.stat().st_size / 1e6:.2f} MB: {args.out}")
     return 0
 

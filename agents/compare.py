@@ -9,25 +9,30 @@ learning.csv and runs.csv to --out.
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # before the imports below, which take seconds
+    from _starting import begin
+
+    begin()
+
 import argparse
-import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
+from smo_gym.cli.arguments import Parser, positive, whole
+from smo_gym.cli.entry import command
 from smo_gym.evaluation import files, scenario, study
 from smo_gym.learning import comparison
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "regulation.yaml"
+RESULTS = ("learning.csv", "runs.csv", "learning.md")
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+    parser = Parser(__doc__)
     add = parser.add_argument
     add(
         "folders",
@@ -37,9 +42,15 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         metavar="DIR",
         help="of trained policies (default: runs)",
     )
-    add("--runs", type=int, default=50, metavar="N", help="random plants a level (default 50)")
-    add("--seed", type=int, default=0, help="of the random plants (default 0)")
-    add("--force-limit", type=float, default=30.0, metavar="N", help="in newtons, for all (default 30, as in training)")
+    add("--runs", type=whole(1), default=50, metavar="N", help="random plants a level (default 50)")
+    add("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
+    add(
+        "--force-limit",
+        type=positive("newtons"),
+        default=30.0,
+        metavar="N",
+        help="in newtons, for all (default 30, as in training)",
+    )
     add(
         "--config",
         type=Path,
@@ -51,31 +62,21 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
+@command("compare.py")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     args = parse(arguments)
-    try:
-        from smo_gym.learning import aggregates, table
+    from smo_gym.learning import aggregates, table
 
-        if args.runs < 1:
-            raise ValueError(f"--runs {args.runs} must be at least 1")
-        if args.seed < 0:
-            raise ValueError(f"--seed {args.seed} must be at least 0")
-        if not 0.0 < args.force_limit < math.inf:
-            raise ValueError(f"--force-limit {args.force_limit:g} must be a positive number of newtons")
-        limit = scenario.Setting[float | None](value=args.force_limit, source="chosen", note="command line")
-        place = scenario.load(args.config).model_copy(update={"force_limit": limit})
-        contenders, left_out = comparison.trained(args.folders, place.environment)
-        contenders += comparison.designed(place)
-        place = comparison.entered(place, contenders)
-        out = files.prepare(args.out)
-    except (ValueError, ImportError) as error:
-        print(f"compare.py: error: {error}", file=sys.stderr)
-        return 2
-    for line in left_out:
-        print(line, file=sys.stderr)
+    limit = scenario.Setting[float | None](value=args.force_limit, source="chosen", note="command line")
+    place = scenario.load(args.config).model_copy(update={"force_limit": limit})
+    contenders, left_out = comparison.trained(args.folders, place.environment)
+    contenders += comparison.designed(place)
+    place = comparison.entered(place, contenders)
     groups = [group for contender in contenders for group in comparison.groups(place, contender, args.runs)]
-    try:
+    with files.claimed(args.out, RESULTS) as out:
+        for line in left_out:
+            print(line, file=sys.stderr)
         with tqdm(
             total=study.simulated_seconds(groups),
             unit="s",
@@ -97,22 +98,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 for a, b in pairs:
                     answers.append(f"- {table.sentence(aggregates.compare(a, b))}")
                     bar.update()
-    except KeyboardInterrupt:
-        print("compare.py: interrupted, nothing was written", file=sys.stderr)
-        return 130
-    words, levels = "\n".join(answers), place.uncertainty.value
-    print(table.render(rows, levels, "simple"))
-    print(f"{words}\n\nresults are in {out}")
-    told = (
-        "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
-        f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. Over "
-        "all levels: the mean of the levels' interquartile means, whose ratio the answers below are about. LQR "
-        f"and SMC act every {place.control_period.value:g} s, policies as in their training. A failed run counts as "
-        "the worst.\n"
-    )
-    files.write(out / "learning.md", f"{told}\n{table.render(rows, levels, 'github')}\n{words}\n")
-    files.write(out / "learning.csv", table.aggregate_csv(rows, levels))
-    files.write(out / "runs.csv", table.runs_csv(rows, levels))
+        words, levels = "\n".join(answers), place.uncertainty.value
+        told = (
+            "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
+            f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. "
+            "Over all levels: the mean of the levels' interquartile means, whose ratio the answers below are about. "
+            f"LQR and SMC act every {place.control_period.value:g} s, policies as in their training. A failed run "
+            "counts as the worst.\n"
+        )
+        texts = (
+            table.aggregate_csv(rows, levels),
+            table.runs_csv(rows, levels),
+            f"{told}\n{table.render(rows, levels, 'github')}\n{words}\n",
+        )
+        try:
+            files.write_set(out, dict(zip(RESULTS, texts, strict=True)))
+        finally:  # what cannot be written can be read at least
+            print(table.render(rows, levels, "simple"))
+            print(words)
+    print(f"\nresults are in {out}")
     return 0
 
 

@@ -6,7 +6,11 @@ python agents/consistency.py --all    # everything
 
 from __future__ import annotations
 
-import argparse
+if __name__ == "__main__":  # before the imports below, which take seconds
+    from _starting import begin
+
+    begin()
+
 import math
 import sys
 from collections.abc import Sequence
@@ -14,6 +18,8 @@ from collections.abc import Sequence
 from tabulate import tabulate
 
 from smo_gym.article.consistency import checks
+from smo_gym.cli.arguments import Parser
+from smo_gym.cli.entry import command
 
 HEADER = (
     "table",
@@ -29,11 +35,10 @@ HEADER = (
 )
 
 
+@command("consistency.py")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the comparison."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+    parser = Parser(__doc__)
     parser.add_argument("--all", action="store_true", help="show what agrees too")
     args = parser.parse_args(arguments)
     found = checks()

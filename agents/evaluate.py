@@ -8,22 +8,27 @@ Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and th
 
 from __future__ import annotations
 
+if __name__ == "__main__":  # before the imports below, which take seconds
+    from _starting import begin
+
+    begin()
+
 import argparse
 import os
-import platform
 import shlex
 import sys
 import time
-from collections.abc import Callable, Sequence
-from importlib import metadata
+from collections.abc import Sequence
 from pathlib import Path
 
 import yaml
 from tqdm import tqdm
 
+from smo_gym.cli.arguments import Parser, fraction, one_of, positive, several, versions, whole
+from smo_gym.cli.entry import Stop, command, said
 from smo_gym.evaluation import agents, figures, files, report, scenario, study, tables
-from smo_gym.evaluation.statistics import results
-from smo_gym.validation import number, unknown
+from smo_gym.evaluation.statistics import Result, results
+from smo_gym.validation import unknown
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
@@ -34,13 +39,11 @@ COMPENSATION = {"on": ("with",), "off": ("without",), "both": ("without", "with"
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+    parser = Parser(__doc__)
     add = parser.add_argument
     add(
         "--controller",
-        nargs="+",
+        **several(str),
         default=["all"],
         metavar="NAME",
         help="lqr, smc, a controller of the scenario's by name, or all of these (default); ppo for the policy that "
@@ -49,15 +52,13 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     add(
         "--scenario",
-        type=one_of("scenario", (*SCENARIOS, "all")),
-        nargs="+",
+        **several(one_of("scenario", (*SCENARIOS, "all"))),
         help="regulation (Table 4), initial-conditions (Table 5), tracking (Table 7) or all (default)",
     )
     add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
     add(
         "--uncertainty",
-        type=fraction,
-        nargs="+",
+        **several(fraction),
         metavar="X",
         help="levels in place of the scenario's: fractions in [0, 1) such as 0.05, or percentages such as 5%%",
     )
@@ -76,7 +77,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     add(
         "--force-limit",
-        type=force,
+        type=positive("newtons"),
         metavar="N",
         help="limit in newtons in place of the scenario's, for all controllers",
     )
@@ -84,49 +85,6 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
     return parser.parse_args(arguments)
-
-
-def one_of(what: str, known: Sequence[str]) -> Callable[[str], str]:
-    """An argument type: one of some names, with a suggestion for any other."""
-
-    def parse_name(text: str) -> str:
-        if text not in known:
-            raise argparse.ArgumentTypeError(unknown(what, text, known))
-        return text
-
-    return parse_name
-
-
-def whole(least: int) -> Callable[[str], int]:
-    """An argument type: a whole number of at least ``least``."""
-
-    def parse_whole(text: str) -> int:
-        if not text.isdecimal() or int(text) < least:
-            raise argparse.ArgumentTypeError(f"{text!r} must be a whole number of at least {least}")
-        return int(text)
-
-    return parse_whole
-
-
-def fraction(text: str) -> float:
-    """An argument type: a fraction in [0, 1), also as a percentage."""
-    try:
-        value = float(text.removesuffix("%")) / (100.0 if text.endswith("%") else 1.0)
-    except ValueError:
-        value = -1.0
-    if not 0.0 <= value < 1.0:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} must be a fraction in [0, 1) such as 0.05, or a percentage such as 5%"
-        )
-    return value
-
-
-def force(text: str) -> float:
-    """An argument type: a positive number of newtons."""
-    try:
-        return number("--force-limit", float(text), above=0.0)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"{text!r} must be a positive number of newtons") from None
 
 
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
@@ -184,83 +142,107 @@ def chosen_arms(observer: str, compensation: str | None) -> list[str]:
     return [*COMPENSATION[compensation or "both"], *others]
 
 
+@command("evaluate.py")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     args = parse(arguments)
     began = time.perf_counter()
     sys.path.append(os.getcwd())  # where an agent of one's own usually is
-    try:
-        scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
-        arms = chosen_arms(args.observer, args.compensation)
-        groups = study.groups(scenarios, controllers, arms, args.runs)
-        drawn, left_out = figures.planned(groups) if args.figures else ([], [])
-        if args.report:
-            drawings = (f"figures/{plan.name}.{form}" for plan in drawn for form in figures.FORMATS)
-            if args.report.resolve() in ((args.out / name).resolve() for name in (*RESULTS, *drawings)):
-                raise ValueError(f"--report {args.report}: is one of the results in --out {args.out}")
-            report.check(groups, args.report)
-        out = files.prepare(args.out)
-        pictures = files.prepare(out / "figures") if drawn else out
-    except (ValueError, ImportError) as error:
-        print(f"evaluate.py: error: {error}", file=sys.stderr)
-        return 2
+    scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
+    arms = chosen_arms(args.observer, args.compensation)
+    groups = study.groups(scenarios, controllers, arms, args.runs)
+    drawn, left_out = figures.planned(groups) if args.figures else ([], [])
+    drawings = [drawing(plan, form) for plan in drawn for form in figures.FORMATS]
+    if args.report:
+        if args.report.resolve() in ((args.out / name).resolve() for name in (*RESULTS, *drawings)):
+            raise ValueError(f"--report {args.report}: is one of the results in --out {args.out}")
+        report.check(groups, args.report)
     runs = sum(group.runs for group in groups)
-    for line in left_out_agents:
-        print(line, file=sys.stderr)
-    try:
-        print(f"{runs} runs to do", file=sys.stderr, flush=True)
-        with tqdm(
-            total=study.simulated_seconds(groups),
-            unit="s",
-            unit_scale=True,
-            desc="simulated",
-            leave=False,
-            disable=None,
-        ) as bar:
-            samples = figures.SAMPLES if drawn or args.report else None
-            outcomes = study.measure(groups, args.seed, bar.update, samples)
-    except KeyboardInterrupt:
-        print("evaluate.py: interrupted, nothing was written", file=sys.stderr)
-        return 130
-    except ValueError as error:  # an agent's force that is not finite, or its error
-        print(f"evaluate.py: error: {error}; nothing was written", file=sys.stderr)
-        return 2
-    numbers = results(outcomes)
-    print(tables.render(numbers, "simple", rms=False))
-    print(tables.diagnostics(outcomes, "simple"))
-    print(f"\n{tables.summary(numbers)}")
-    versions = {"python": platform.python_version()}
-    versions |= {name: metadata.version(name) for name in ("smo_gym", "gymnasium", "numba", "numpy", "scipy")}
-    resolved = {
-        "command": {key: str(value) if isinstance(value, Path) else value for key, value in vars(args).items()},
-        "versions": versions,
-        "scenarios": [one.model_dump(mode="json") for one in scenarios],
-    }
-    notes = tables.diagnostics(outcomes, "github")
-    files.write(out / "results.csv", tables.results_csv(numbers))
-    files.write(out / "runs.csv", tables.runs_csv(outcomes))
-    files.write(out / "tables.md", tables.render(numbers, "github", rms=True) + f"\n## Diagnostics\n\n{notes}\n")
-    files.write(out / "tables.tex", tables.render(numbers, "latex_booktabs", rms=True))
-    for one in scenarios:
-        if (reference := one.trajectory()) is not None:
-            files.write(out / "reference.json", reference.to_json() + "\n")
-    files.write(out / "settings.yaml", yaml.safe_dump(resolved, sort_keys=False))
-    try:
-        for plan in tqdm(drawn, unit="figure", leave=False, disable=None):
-            figure = figures.draw(plan, outcomes, numbers)
-            for form in figures.FORMATS:
-                files.write_bytes(pictures / f"{plan.name}.{form}", figures.encode(figure, form))
-        if args.report:
-            command = shlex.join(["python", "agents/evaluate.py", *(sys.argv[1:] if arguments is None else arguments)])
-            files.write(args.report, report.render(outcomes, numbers, command, versions))
-    except KeyboardInterrupt:
-        print(f"evaluate.py: interrupted while drawing; the tables are in {out}", file=sys.stderr)
-        return 130
+    with files.claimed(args.out, (*RESULTS, *drawings)) as out:
+        if drawn:
+            files.prepare(out / "figures")
+        print("\n".join([*left_out_agents, f"{runs} runs to do"]), file=sys.stderr, flush=True)
+        try:
+            with tqdm(
+                total=study.simulated_seconds(groups),
+                unit="s",
+                unit_scale=True,
+                desc="simulated",
+                leave=False,
+                disable=None,
+            ) as bar:
+                samples = figures.SAMPLES if drawn or args.report else None
+                outcomes = study.measure(groups, args.seed, bar.update, samples)
+        except ValueError as error:  # an agent's force that is not finite, or its error
+            raise ValueError(f"{error}; nothing was written") from None
+        numbers = results(outcomes)
+        try:
+            files.write_set(out, contents(args, scenarios, outcomes, numbers), replaced())
+        finally:  # what cannot be written can be read at least
+            print(tables.render(numbers, "simple", rms=False))
+            print(tables.diagnostics(outcomes, "simple"))
+            print(f"\n{tables.summary(numbers)}", flush=True)
+        given = sys.argv[1:] if arguments is None else arguments
+        try:
+            draw(out, drawn, outcomes, numbers)
+            if args.report:
+                line = shlex.join(["python", "agents/evaluate.py", *given])
+                files.write(args.report, report.render(outcomes, numbers, line, versions()))
+        except KeyboardInterrupt:
+            raise Stop(f"interrupted while drawing; the tables are in {out}") from None
+        except OSError as error:
+            raise Stop(f"error: {said(error)}; the tables are in {out}", 1) from None
     if left_out:
         print(f"\nno runs for Figure {', '.join(str(plan.number) for plan in left_out)}: not drawn")
     where = f"{out} and {args.report}" if args.report else out
     print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {where}")
     return 0
+
+
+def contents(
+    args: argparse.Namespace,
+    scenarios: Sequence[scenario.Scenario],
+    outcomes: Sequence[study.Outcome],
+    numbers: Sequence[Result],
+) -> dict[str, str]:
+    """The files of results by name, the settings they come from last."""
+    resolved = {
+        "command": {key: str(value) if isinstance(value, Path) else value for key, value in vars(args).items()},
+        "versions": versions(),
+        "scenarios": [one.model_dump(mode="json") for one in scenarios],
+    }
+    notes = tables.diagnostics(outcomes, "github")
+    followed = [reference for one in scenarios if (reference := one.trajectory()) is not None]
+    return {
+        "results.csv": tables.results_csv(numbers),
+        "runs.csv": tables.runs_csv(outcomes),
+        "tables.md": tables.render(numbers, "github", rms=True) + f"\n## Diagnostics\n\n{notes}\n",
+        "tables.tex": tables.render(numbers, "latex_booktabs", rms=True),
+        **({"reference.json": followed[-1].to_json() + "\n"} if followed else {}),
+        "settings.yaml": yaml.safe_dump(resolved, sort_keys=False),
+    }
+
+
+def draw(
+    out: Path, drawn: Sequence[figures.Plan], outcomes: Sequence[study.Outcome], numbers: Sequence[Result]
+) -> None:
+    """The figures, as a set of files."""
+    made: dict[str, str | bytes] = {}
+    for plan in tqdm(drawn, unit="figure", leave=False, disable=None):
+        figure = figures.draw(plan, outcomes, numbers)
+        made |= {drawing(plan, form): figures.encode(figure, form) for form in figures.FORMATS}
+    if made:
+        files.write_set(out, made)
+
+
+def drawing(plan: figures.Plan, form: str) -> str:
+    """The name of a figure's file in --out."""
+    return f"figures/{plan.name}.{form}"
+
+
+def replaced() -> list[str]:
+    """All that earlier runs may have left in --out, and that these results do not go with."""
+    return [*RESULTS, *(drawing(plan, form) for plan in figures.PLANS for form in figures.FORMATS)]
 
 
 if __name__ == "__main__":

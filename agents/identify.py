@@ -11,11 +11,16 @@ generation: run the same command again to go on after an interruption. Writes re
 
 from __future__ import annotations
 
-import argparse
+if __name__ == "__main__":  # before the imports below, which take seconds
+    from _starting import begin
+
+    begin()
+
 import json
 import math
 import pickle
 import sys
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +28,8 @@ from typing import Any
 from tabulate import tabulate
 from tqdm import tqdm
 
+from smo_gym.cli.arguments import Parser, whole
+from smo_gym.cli.entry import Stop, command
 from smo_gym.evaluation import files, scenario
 from smo_gym.evaluation.identification import Hypothesis, Problem, Search, cost, profile
 from smo_gym.evaluation.problems import Lqr, Regulation, Tracking
@@ -31,58 +38,58 @@ CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 FACTORS = (0.8, 0.9, 1.1, 1.25)
 
 
+@command("identify.py")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Search, or go on searching, and report; 0 when all went well, 2 for a bad argument, 130 when interrupted."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+    parser = Parser(__doc__)
     add = parser.add_argument
     add("--target", choices=tuple(PROBLEMS), default="lqr", help="default %(default)s")
-    add("--restarts", type=int, default=2, metavar="N", help="random starts (default 2)")
-    add("--generations", type=int, default=80, metavar="N", help="of each search (default 80)")
-    add("--refit", type=int, default=10, metavar="N", help="generations for each rejected hypothesis (default 10)")
-    add("--seed", type=int, default=0, help="of the first start (default 0)")
+    add("--restarts", type=whole(1), default=2, metavar="N", help="random starts (default 2)")
+    add("--generations", type=whole(1), default=80, metavar="N", help="of each search (default 80)")
+    add("--refit", type=whole(0), default=10, metavar="N", help="generations for each rejected hypothesis (default 10)")
+    add("--seed", type=whole(0), default=0, help="of the first start (default 0)")
     add("--out", type=Path, default=Path("identification"), metavar="DIR", help="default %(default)s")
     args = parser.parse_args(arguments)
     plan = {name: getattr(args, name) for name in ("target", "restarts", "generations", "refit", "seed")}
-    try:
-        if min(args.restarts, args.generations) < 1 or min(args.refit, args.seed) < 0:
-            raise ValueError("--restarts and --generations must be at least 1, --refit and --seed at least 0")
-        problem = PROBLEMS[args.target]()
-        out = files.prepare(args.out)
+    problem = PROBLEMS[args.target]()
+    with files.claimed(args.out, ["state.pkl", "report.md", "report.json"]) as out:
         searches = resume(out / "state.pkl", plan, problem) or [
             Search(problem, Hypothesis(), args.seed + i) for i in range(args.restarts)
         ]
-    except (ValueError, ImportError) as error:
-        print(f"identify.py: error: {error}", file=sys.stderr)
-        return 2
-    total = args.restarts * args.generations + args.refit * len(problem.alternatives)
-    done = sum(search.generations for search in searches)
-    try:
-        with tqdm(total=total, initial=done, desc="generations", leave=False, disable=None) as bar:
 
-            def run(search: Search, generations: int) -> None:
-                while search.generations < generations:
-                    search.step()
-                    files.write_bytes(out / "state.pkl", pickle.dumps((plan, searches)))
-                    bar.set_postfix_str(f"{search.hypothesis.name}: RMS {100 * search.rms:.1f} %")
-                    bar.update()
+        def save() -> None:
+            files.write_bytes(out / "state.pkl", pickle.dumps((plan, searches)))
 
-            for search in searches[: args.restarts]:
-                run(search, args.generations)
-            best = min(searches[: args.restarts], key=lambda search: search.rms).best
-            if len(searches) == args.restarts and args.refit:
-                searches += [Search(problem, rival, args.seed, best) for rival in problem.alternatives]
-            for search in searches[args.restarts :]:
-                run(search, args.refit)
-    except KeyboardInterrupt:
-        print(f"identify.py: interrupted; the same command goes on from {out / 'state.pkl'}", file=sys.stderr)
-        return 130
-    text, data = report(problem, searches)
-    files.write(out / "report.md", text)
-    files.write(out / "report.json", json.dumps(data, indent=1) + "\n")
+        try:
+            search_on(args, problem, searches, save)
+        except KeyboardInterrupt:
+            raise Stop(f"interrupted; the same command goes on from {out / 'state.pkl'}") from None
+        text, data = report(problem, searches)
+        files.write_set(out, {"report.md": text, "report.json": json.dumps(data, indent=1) + "\n"})
     print(text)
     return 0
+
+
+def search_on(args: Namespace, problem: Problem, searches: list[Search], save: Callable[[], None]) -> None:
+    """All generations that are left, and the rejected hypotheses from the best point; saved after each."""
+    total = args.restarts * args.generations + args.refit * len(problem.alternatives)
+    done = sum(search.generations for search in searches)
+    with tqdm(total=total, initial=done, desc="generations", leave=False, disable=None) as bar:
+
+        def run(search: Search, generations: int) -> None:
+            while search.generations < generations:
+                search.step()
+                save()
+                bar.set_postfix_str(f"{search.hypothesis.name}: RMS {100 * search.rms:.1f} %")
+                bar.update()
+
+        for search in searches[: args.restarts]:
+            run(search, args.generations)
+        best = min(searches[: args.restarts], key=lambda search: search.rms).best
+        if len(searches) == args.restarts and args.refit:
+            searches += [Search(problem, rival, args.seed, best) for rival in problem.alternatives]
+        for search in searches[args.restarts :]:
+            run(search, args.refit)
 
 
 def config(name: str) -> scenario.Scenario:

@@ -9,7 +9,13 @@ settings file (--config) to see those of your own beside them.
 
 from __future__ import annotations
 
-import argparse
+if __name__ == "__main__":  # before the imports below, which take seconds
+    from _starting import begin
+
+    begin()
+
+import contextlib
+import io
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,34 +27,47 @@ from scipy import stats
 from tabulate import tabulate
 from tqdm import tqdm
 
-from smo_gym import CartPendulum, Gains, SlidingModeController, VectorObserverWrapper, theorem
-from smo_gym.evaluation import rollout, scenario
+from smo_gym import CartPendulum, Gains, SlidingModeController, SlidingModeObserver, VectorObserverWrapper, theorem
+from smo_gym.cli.arguments import Parser, whole
+from smo_gym.cli.entry import command
+from smo_gym.evaluation import files, rollout, scenario
 from smo_gym.evaluation.convergence import Convergence, converge
 from smo_gym.evaluation.rollout import Traces
 from smo_gym.evaluation.scenario import Scenario, TheoremSettings
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 DT = 0.001
+RESULT = "theorem.txt"
 
 
+@command("theorem.py")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the three parts; 0 when all went well, 2 for a bad argument or setting."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+    parser = Parser(__doc__)
     parser.add_argument("--config", type=Path, default=CONFIGS / "theorem.yaml", metavar="FILE", help="operating set")
-    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="random plants and starts (default 1000)")
-    parser.add_argument("--seed", type=int, default=0, help="of the random plants and starts (default 0)")
+    parser.add_argument("--runs", type=whole(1), default=1000, metavar="N", help="random plants, starts (default 1000)")
+    parser.add_argument("--seed", type=whole(0), default=0, help="of the random plants and starts (default 0)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for theorem.txt (default: none)")
     args = parser.parse_args(arguments)
-    try:
-        settings = scenario.load_theorem(args.config)
-        if args.runs < 1 or args.seed < 0:
-            raise ValueError(f"--runs {args.runs} must be at least 1 and --seed {args.seed} at least 0")
-        over = settings.over(CartPendulum())
-        observer = settings.build(DT, over.model)
-    except ValueError as error:
-        print(f"theorem.py: error: {error}", file=sys.stderr)
-        return 2
+    settings = scenario.load_theorem(args.config)
+    over = settings.over(CartPendulum())
+    observer = settings.build(DT, over.model)
+    with contextlib.nullcontext() if args.out is None else files.claimed(args.out, [RESULT]) as out:
+        said_all = io.StringIO()
+        with contextlib.redirect_stdout(said_all):
+            parts(settings, over, observer, args.runs, args.seed)
+        try:
+            if out is not None:
+                files.write(out / RESULT, said_all.getvalue())
+        finally:  # what cannot be written can be read at least
+            print(said_all.getvalue(), end="")
+    return 0
+
+
+def parts(
+    settings: TheoremSettings, over: theorem.OperatingSet, observer: SlidingModeObserver, count: int, seed: int
+) -> None:
+    """Print the three parts."""
     article = scenario.load(CONFIGS / "initial-conditions.yaml")
     gains = {"printed, LQR": Gains.of("lqr"), "printed, SMC": Gains.of("smc"), "designed": Gains.of(observer.gains)}
     if settings.gains is not None:
@@ -62,10 +81,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(
         f"The designed observer wants a step of {1e3 * (observer.step or DT):.3g} ms with slopes {observer.slopes}.\n"
     )
-    rng = np.random.default_rng(args.seed)
+    rng = np.random.default_rng(seed)
     low, high = np.array(settings.starts.value)
-    starts = rng.uniform(low, high, (args.runs, 4))
-    plants = np.array([CartPendulum().draw(over.uncertainty, rng).as_array() for _ in range(args.runs)])
+    starts = rng.uniform(low, high, (count, 4))
+    plants = np.array([CartPendulum().draw(over.uncertainty, rng).as_array() for _ in range(count)])
     lqr = article.controllers["lqr"]
     with tqdm(total=round(settings.horizon.value / DT), desc="samples", leave=False, disable=None) as bar:
         found = converge(
@@ -83,7 +102,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     traces = {name: along(article, name) for name in article.controllers}
     trajectories(article, traces)
     switching(article, traces["smc"])
-    return 0
 
 
 def gain_conditions(gains: dict[str, Gains], over: theorem.OperatingSet) -> None:

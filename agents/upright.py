@@ -5,7 +5,12 @@ python agents/upright.py --runs 1000
 
 from __future__ import annotations
 
-import argparse
+if __name__ == "__main__":  # before the imports below, which take seconds
+    from _starting import begin
+
+    begin()
+
+import contextlib
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,9 +19,13 @@ from scipy import stats
 from tabulate import tabulate
 from tqdm import tqdm
 
-from smo_gym.evaluation import scenario, study
+from smo_gym.cli.arguments import Parser, whole
+from smo_gym.cli.entry import command
+from smo_gym.evaluation import files, scenario, study
+from smo_gym.evaluation.tables import as_csv
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "upright.yaml"
+RESULTS = ("falls.csv", "falls.md")
 ARMS = {
     "without": "printed gains, without compensation",
     "with": "with compensation",
@@ -25,38 +34,59 @@ ARMS = {
 }
 
 
+@command("upright.py")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the table of falls; 0 when all went well, 2 for a bad argument or setting."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
-    )
+    parser = Parser(__doc__)
     parser.add_argument("--config", type=Path, default=CONFIG, metavar="FILE", help="a scenario of your own")
-    parser.add_argument("--runs", type=int, default=1000, metavar="N", help="random plants a cell (default 1000)")
-    parser.add_argument("--seed", type=int, default=0, help="of the random plants (default 0)")
+    parser.add_argument("--runs", type=whole(1), default=1000, metavar="N", help="random plants a cell (default 1000)")
+    parser.add_argument("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder for falls.csv and falls.md (default: none)")
     args = parser.parse_args(arguments)
-    try:
-        if args.runs < 1 or args.seed < 0:
-            raise ValueError(f"--runs {args.runs} must be at least 1 and --seed {args.seed} at least 0")
-        one = scenario.load(args.config)
-        groups = [g for g in study.groups([one], list(one.controllers), list(ARMS), args.runs) if g.uncertainty > 0.0]
-    except ValueError as error:
-        print(f"upright.py: error: {error}", file=sys.stderr)
-        return 2
-    total = study.simulated_seconds(groups)
-    with tqdm(total=total, unit="s", unit_scale=True, desc="simulated", leave=False, disable=None) as bar:
-        outcomes = study.measure(groups, args.seed, bar.update)
+    one = scenario.load(args.config)
+    groups = [g for g in study.groups([one], list(one.controllers), list(ARMS), args.runs) if g.uncertainty > 0.0]
+    with contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS) as out:
+        total = study.simulated_seconds(groups)
+        with tqdm(total=total, unit="s", unit_scale=True, desc="simulated", leave=False, disable=None) as bar:
+            outcomes = study.measure(groups, args.seed, bar.update)
+        told = f"Falls in percent of {args.runs} random plants, with 95 % Wilson intervals:\n\n"
+        try:
+            if out is not None:
+                falls = told + table(outcomes, "github") + f"\n\nSeed {args.seed}, {args.config}\n"
+                files.write_set(out, dict(zip(RESULTS, (data(outcomes), falls), strict=True)))
+        finally:  # what cannot be written can be read at least
+            print(told + table(outcomes, "simple"))
+    return 0
+
+
+def table(outcomes: Sequence[study.Outcome], form: str) -> str:
+    """Percentages by start, level and arm, in a format of tabulate."""
     cells: dict[tuple[str, str], dict[str, str]] = {}
-    for outcome in outcomes:
-        group = outcome.group
-        falls, runs = int(outcome.failed.sum()), len(outcome.failed)
-        interval = stats.binomtest(falls, runs).proportion_ci(method="wilson")
-        text = f"{100 * falls / runs:.1f} [{100 * interval.low:.1f}, {100 * interval.high:.1f}]"
+    for group, falls, runs, low, high in counts(outcomes):
+        text = f"{100 * falls / runs:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
         cells.setdefault((group.case, f"{100 * group.uncertainty:g} %"), {})[group.arm] = text
     rows = [(*place, *(by_arm[arm] for arm in ARMS)) for place, by_arm in cells.items()]
     rows.sort(key=lambda row: row[0])  # starts, each with its levels in order
-    print(f"Falls in percent of {args.runs} random plants, with 95 % Wilson intervals:\n")
-    print(tabulate(rows, ("start, rad", "uncertainty", *ARMS.values()), disable_numparse=True))
-    return 0
+    return tabulate(rows, ("start, rad", "uncertainty", *ARMS.values()), tablefmt=form, disable_numparse=True)
+
+
+def data(outcomes: Sequence[study.Outcome]) -> str:
+    """The same as CSV, fractions in place of percentages."""
+    lines = [
+        (group.case, group.uncertainty, group.arm, falls, runs, falls / runs, low, high)
+        for group, falls, runs, low, high in counts(outcomes)
+    ]
+    return as_csv(("start", "uncertainty", "arm", "falls", "runs", "fraction", "ci_low", "ci_high"), lines)
+
+
+def counts(outcomes: Sequence[study.Outcome]) -> list[tuple[study.Group, int, int, float, float]]:
+    """Falls and runs of every group, and the Wilson interval of their ratio."""
+    found = []
+    for outcome in outcomes:
+        falls, runs = int(outcome.failed.sum()), len(outcome.failed)
+        interval = stats.binomtest(falls, runs).proportion_ci(method="wilson")
+        found.append((outcome.group, falls, runs, float(interval.low), float(interval.high)))
+    return found
 
 
 if __name__ == "__main__":

@@ -173,8 +173,9 @@ def test_the_recurrent_algorithm_learns_and_is_exported(tmp_path, monkeypatch):
         (["--env", "SMOPendulum-v1"], "unknown environment 'SMOPendulum-v1': did you mean 'SMOPendulum-v0'"),
         (["--observation", "positons"], "did you mean 'positions'"),
         (["--algo", "recurrent", "--observation", "smo"], "is for 'positions' alone"),
-        (["--uncertainty", "1.5"], "uncertainty=1.5 must be a fraction"),
-        (["--seed", "-1"], "--seed -1 must be at least 0"),
+        (["--uncertainty", "1.5"], "--uncertainty: '1.5' must be a fraction"),
+        (["--seed", "-1"], "--seed: '-1' must be a whole number of at least 0"),
+        (["--steps", "0"], "error: argument --steps: '0' must be a whole number of at least 1\n"),
         (["--config", "nowhere.yaml"], "nowhere.yaml: cannot be read"),
     ],
 )

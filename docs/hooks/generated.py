@@ -32,7 +32,9 @@ def on_page_markdown(markdown: str, **kwargs: Any) -> str:
 
 def commands() -> str:
     """The help of every command."""
-    return "\n\n".join(f"## {path.name}\n\n{output(path.name, '--help')}" for path in sorted(ROOT.glob("agents/*.py")))
+    return "\n\n".join(
+        f"## {path.name}\n\n{output(path.name, '--help')}" for path in sorted(ROOT.glob("agents/[!_]*.py"))
+    )
 
 
 def output(name: str, *arguments: str) -> str:

@@ -317,6 +317,10 @@ def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
         return data
     if not isinstance(base, str):
         raise ValueError(f"{path}: extends={base!r} must be the name of a file")
+    if not (path.parent / base).exists():
+        raise ValueError(
+            f"{path}: extends {base}, which is not beside it: copy that file too, or give the whole path to it"
+        )
     return _merged(_read(path.parent / base, (*above, path.resolve())), data)
 
 

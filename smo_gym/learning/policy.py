@@ -155,13 +155,13 @@ class MlpPolicy:
         return observation[..., :size]
 
     def save(self, path: Path) -> None:
-        """Write ``path`` (.safetensors) and the card beside it (.json), each as a whole, the weights last."""
+        """Write ``path`` (.safetensors) and the card beside it (.json), which belong together, the weights last."""
         tensors: dict[str, Array] = {}
         for k, (W, b) in enumerate(self.layers):
             tensors |= {f"{k}.weight": np.ascontiguousarray(W), f"{k}.bias": np.ascontiguousarray(b)}
         tensors |= self._memory()
-        files.write(path.with_suffix(".json"), json.dumps(self.card.model_dump(mode="json"), indent=1) + "\n")
-        files.write_bytes(path, tensor_bytes(tensors))
+        card = json.dumps(self.card.model_dump(mode="json"), indent=1) + "\n"
+        files.write_set(path.parent, {path.with_suffix(".json").name: card, path.name: tensor_bytes(tensors)})
 
     def _memory(self) -> dict[str, Array]:
         return {}
