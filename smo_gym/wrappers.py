@@ -115,14 +115,14 @@ def _measured(observation: Array, y: Array) -> None:
     Raises:
         ValueError: something between the environment and the observer has changed it.
     """
-    if not np.array_equal(observation, y):
+    if np.count_nonzero(observation != y):
         raise ValueError(f"the environment observes {short(observation)} where {short(y)} was measured: {UNSEEN}")
 
 
 def _lost(xhat: Array) -> Flags | None:
     """Which estimates (4, n) are not finite, (n,); None where all are."""
     finite = np.isfinite(xhat)
-    return None if finite.all() else np.asarray(~finite.all(axis=0))
+    return None if np.count_nonzero(finite) == finite.size else np.asarray(~finite.all(axis=0))
 
 
 def _force(task: Task) -> float:
@@ -186,24 +186,25 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
         """Start the episode and the estimate."""
         observation, info = self.env.reset(seed=seed, options=options)
         self._estimator.reset(self._every, info["state"][:, None])
-        return self._append(observation, info, False), info
+        return self._append(observation, info, self._estimator.xhat[:, 0], False), info
 
     def step(self, action: Array) -> tuple[Array, Any, bool, bool, dict[str, Any]]:
         """Run a control period and bring the estimate to its end."""
         observation, reward, terminated, truncated, info = self.env.step(action)
         samples, force, state = info["samples"], info["force"], info["state"]
         self._estimator.update(Period(self._y, samples[:, :, None], np.array([force]), state[:, None]))
-        lost = _lost(self._estimator.xhat) is not None
+        xhat = self._estimator.xhat
+        lost = _lost(xhat) is not None
         if lost:
             self._estimator.reset(self._every, state[:, None])
-        return self._append(observation, info, lost), reward, terminated, truncated, info
+            xhat = self._estimator.xhat
+        return self._append(observation, info, xhat[:, 0], lost), reward, terminated, truncated, info
 
-    def _append(self, observation: Array, info: dict[str, Any], lost: bool) -> Array:
+    def _append(self, observation: Array, info: dict[str, Any], xhat: Array, lost: bool) -> Array:
         y = info["samples"][-1]
         _measured(observation[:2], y)
         self._y = y[:, None].copy()
         info["estimate_failed"] = lost
-        xhat = self._estimator.xhat[:, 0]
         self._show(xhat)
         return np.concatenate([observation, xhat])
 
@@ -250,6 +251,8 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         self._mode = env.metadata["autoreset_mode"]
         self._over = np.zeros(n, dtype=np.bool_)
         self._none, self._every = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.bool_)
+        for shared in (self._none, self._every):
+            shared.flags.writeable = False  # infos share them
         base = env.unwrapped
         self._show = base.show if isinstance(base, PendulumVectorEnv) else lambda xhat: None
         self.single_observation_space = _space(env.single_observation_space)
@@ -294,7 +297,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         y, xhat = info["samples"][:, -1], self._estimator.xhat
         _measured(observation[:, :2], y)
         self._y = y.T.copy()
-        info |= {"estimate_failed": failed.copy(), "_estimate_failed": self._every.copy()}
+        info["estimate_failed"], info["_estimate_failed"] = failed, self._every
         self._show(xhat)
         appended = np.empty((len(observation), observation.shape[1] + 4))
         appended[:, :-4] = observation
