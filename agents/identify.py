@@ -18,7 +18,6 @@ if __name__ == "__main__":  # before the imports below, which take seconds
 
 import json
 import math
-import pickle
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Sequence
@@ -35,6 +34,8 @@ from smo_gym.evaluation.identification import Hypothesis, Problem, Search, cost,
 from smo_gym.evaluation.problems import Lqr, Regulation, Tracking
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
+STATE = "state.json"
+Costs = Sequence[Sequence[float]]
 FACTORS = (0.8, 0.9, 1.1, 1.25)
 
 
@@ -52,18 +53,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args = parser.parse_args(arguments)
     plan = {name: getattr(args, name) for name in ("target", "restarts", "generations", "refit", "seed")}
     problem = PROBLEMS[args.target]()
-    with files.claimed(args.out, ["state.pkl", "report.md", "report.json"]) as out:
-        searches = resume(out / "state.pkl", plan, problem) or [
-            Search(problem, Hypothesis(), args.seed + i) for i in range(args.restarts)
-        ]
+    with files.claimed(args.out, [STATE, "report.md", "report.json"]) as out:
+        costs = resume(out / STATE, plan)
+        searches = begun(args, problem, costs, out / STATE)
 
         def save() -> None:
-            files.write_bytes(out / "state.pkl", pickle.dumps((plan, searches)))
+            state = {"plan": plan, "costs": [search.costs for search in searches]}
+            files.write(out / STATE, json.dumps(state) + "\n")
 
         try:
             search_on(args, problem, searches, save)
         except KeyboardInterrupt:
-            raise Stop(f"interrupted; the same command goes on from {out / 'state.pkl'}") from None
+            raise Stop(f"interrupted; the same command goes on from {out / STATE}") from None
         text, data = report(problem, searches)
         files.write_set(out, {"report.md": text, "report.json": json.dumps(data, indent=1) + "\n"})
     print(text)
@@ -85,9 +86,8 @@ def search_on(args: Namespace, problem: Problem, searches: list[Search], save: C
 
         for search in searches[: args.restarts]:
             run(search, args.generations)
-        best = min(searches[: args.restarts], key=lambda search: search.rms).best
         if len(searches) == args.restarts and args.refit:
-            searches += [Search(problem, rival, args.seed, best) for rival in problem.alternatives]
+            searches += rivals(args, problem, searches)
         for search in searches[args.restarts :]:
             run(search, args.refit)
 
@@ -104,23 +104,48 @@ PROBLEMS: dict[str, Callable[[], Problem]] = {
 }
 
 
-def resume(path: Path, plan: dict[str, Any], problem: Problem) -> list[Search] | None:
-    """The searches of an interrupted run, or None where there was none.
+def rivals(args: Namespace, problem: Problem, searches: Sequence[Search], costs: Sequence[Costs] = ()) -> list[Search]:
+    """A search under each hypothesis to reject, from the best point of all starts."""
+    best = min(searches, key=lambda search: search.rms).best
+    return [
+        Search(problem, rival, args.seed, best, costs=known)
+        for rival, known in zip(problem.alternatives, costs or [()] * len(problem.alternatives), strict=True)
+    ]
+
+
+def begun(args: Namespace, problem: Problem, costs: Sequence[Costs], path: Path) -> list[Search]:
+    """The searches, those of an interrupted run where it was stopped.
 
     Raises:
-        ValueError: it ran with other options.
+        ValueError: the costs are not of such searches.
+    """
+    n = args.restarts
+    starts = list(costs[:n]) or [()] * n
+    try:
+        if len(starts) != n or len(costs) not in (0, n, n + len(problem.alternatives)):
+            raise ValueError(f"it holds {len(costs)} searches")
+        searches = [Search(problem, Hypothesis(), args.seed + i, costs=known) for i, known in enumerate(starts)]
+        return searches + (rivals(args, problem, searches, costs[n:]) if costs[n:] else [])
+    except (ValueError, TypeError) as error:
+        raise ValueError(f"{path} is damaged ({error}): remove it to start anew") from None
+
+
+def resume(path: Path, plan: dict[str, Any]) -> list[Costs]:
+    """The costs of an interrupted run, search by search; none where there was no such run.
+
+    Raises:
+        ValueError: it ran with other options, or the file is damaged.
     """
     if not path.exists():
-        return None
+        return []
     try:
-        before, searches = pickle.loads(path.read_bytes())
-    except (pickle.UnpicklingError, EOFError):
+        state = json.loads(path.read_text(encoding="utf-8"))
+        before, costs = state["plan"], list(state["costs"])
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise ValueError(f"{path} is damaged: remove it to start anew") from None
     if before != plan:
         raise ValueError(f"{path} belongs to a run with {before}, not {plan}: choose another --out or remove it")
-    for search in searches:
-        search.problem = problem
-    return list(searches)
+    return costs
 
 
 def report(problem: Problem, searches: Sequence[Search]) -> tuple[str, dict[str, Any]]:

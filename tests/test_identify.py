@@ -100,7 +100,7 @@ def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
         stdout=subprocess.PIPE,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a parent may ignore it
     )
-    while not (tmp_path / "stopped" / "state.pkl").exists() and process.poll() is None:
+    while not (tmp_path / "stopped" / "state.json").exists() and process.poll() is None:
         pass
     process.send_signal(signal.SIGINT)
     process.communicate()

@@ -14,9 +14,9 @@ from sb3_contrib import RecurrentPPO
 from stable_baselines3 import PPO
 
 from smo_gym import ObserverWrapper
-from smo_gym.learning import MlpPolicy
-from smo_gym.learning.observations import KINDS, agent_view
-from smo_gym.learning.policy import Card
+from smo_gym.learning import MlpPolicy, shipped
+from smo_gym.learning.observations import KINDS, UNITS, agent_view
+from smo_gym.learning.policy import Card, LstmPolicy
 from smo_gym.learning.settings import Run, built
 from smo_gym.learning.training import frozen
 
@@ -116,7 +116,7 @@ def test_files_keep_everything(observation, algorithm, tmp_path):
 
 def test_bad_files_are_named(tmp_path):
     path = tmp_path / "a.safetensors"
-    with pytest.raises(ValueError, match=r"a\.json: cannot be read"):
+    with pytest.raises(ValueError, match=r"a\.safetensors: cannot be read"):
         MlpPolicy.load(path)
     _, policy = untrained()
     policy.save(path)
@@ -193,3 +193,44 @@ def test_the_control_period_is_that_of_training(tmp_path):
 def test_nothing_of_torch_is_needed():
     code = "import sys, smo_gym.learning as l; l.shipped('SMOPendulum-v0'); assert 'torch' not in sys.modules"
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
+
+
+@pytest.mark.parametrize("kind", ["smo", "stacked", "lstm"])
+def test_an_action_has_the_same_bits_in_every_batch(kind):
+    """A matrix product of BLAS sums in an order that depends on the number of rows; these sums do not."""
+    rng = np.random.default_rng(0)
+    observation = "smo" if kind == "smo" else "positions" if kind == "lstm" else "stacked"
+    frames, size = (4, 2) if kind == "stacked" else (1, 6 if kind == "smo" else 2)
+    width = 64 if kind == "lstm" else frames * size
+    card = Card(
+        environment="SMOPendulum-v0",
+        observation=observation,
+        units=tuple(UNITS[:2] * (size // 2) if size == 2 else (*UNITS[:2], *UNITS)),
+        frames=frames,
+        layers=(width, 64, 64, 1),
+        lstm=64 if kind == "lstm" else None,
+        force_limit=30.0,
+    )
+    layers = [(rng.normal(size=(k, m)) / 8, rng.normal(size=k)) for m, k in ((width, 64), (64, 64), (64, 1))]
+    lstm = tuple(rng.normal(size=s) / 8 for s in ((256, size), (256, 64), (256,), (256,)))
+    policy = LstmPolicy(card, layers, lstm) if kind == "lstm" else MlpPolicy(card, layers)
+    runs = {n: [] for n in (1, 7, 300)}
+    observations = rng.normal(size=(3, 300, size))
+    for n, found in runs.items():
+        state = None
+        for seen in observations:
+            action, state = policy.predict(seen[:n], state)
+            found.append(action)
+    for n in (1, 7):
+        assert all(np.array_equal(a, b[:n]) for a, b in zip(runs[n], runs[300], strict=True))
+    alone, _ = policy.predict(observations[0, 5])
+    assert np.array_equal(alone, runs[300][0][5])
+
+
+def test_a_policy_that_lacks_its_observer_says_what_to_do():
+    policy = shipped("SMOPendulum-v0")
+    with pytest.raises(ValueError, match=r"wrap it in smo_gym\.ObserverWrapper"):
+        policy.predict(np.zeros(2))
+    with pytest.raises(ValueError, match="observation='abc' must be an array of numbers"):
+        policy.predict("abc")
+    assert np.array_equal(policy.predict([0.0] * 6)[0], policy.predict(np.zeros(6))[0])

@@ -1,6 +1,8 @@
 """Training runs: resumed, watched on other plants, exported; and bad input."""
 
 import importlib.util
+import os
+import pickle
 import sys
 from pathlib import Path
 
@@ -99,15 +101,40 @@ def test_another_configuration_does_not_resume(command, capsys):
     assert command() == 0
     assert command("--seed", "3", "--uncertainty", "0.1") == 2
     message = capsys.readouterr().err
-    assert "another configuration: seed is 0 there and 3 here; options is" in message
+    assert "another configuration: seed is 0 there and 3 here; options.uncertainty is 0.2 there and 0.1 here" in message
+    assert "Choose another --out, or remove that folder" in message
+
+
+class _Evil:
+    def __init__(self, to):
+        self.to = to
+
+    def __reduce__(self):
+        return os.system, (f"touch {self.to}",)
+
+
+def test_no_file_that_lies_there_runs_code(command, tmp_path, capsys):
+    """A checkpoint holds tensors and numbers; a pickle in its place is refused, one beside it is not opened."""
+    assert command("--steps", "32") == 0
+    evil = pickle.dumps(_Evil(tmp_path / "ran"))
+    for name in ("checkpoint.zip", "state.pkl"):
+        (tmp_path / "run" / name).write_bytes(evil)
+    assert command("--steps", "32") == 0
+    for name in ("checkpoint.pt", "run.json", "best.safetensors"):
+        kept = (tmp_path / "run" / name).read_bytes()
+        (tmp_path / "run" / name).write_bytes(evil)
+        assert command("--steps", "32") == 2
+        assert len(capsys.readouterr().err.splitlines()) == 1
+        (tmp_path / "run" / name).write_bytes(kept)
+    assert not (tmp_path / "ran").exists()
 
 
 def test_a_damaged_checkpoint_is_named(command, tmp_path, capsys):
     assert command("--steps", "32") == 0
-    checkpoint = tmp_path / "run/checkpoint.zip"
+    checkpoint = tmp_path / "run/checkpoint.pt"
     checkpoint.write_bytes(checkpoint.read_bytes()[:-40])
     assert command("--steps", "32") == 2
-    assert "checkpoint.zip: cannot be read" in capsys.readouterr().err
+    assert "checkpoint.pt: cannot be read" in capsys.readouterr().err
 
 
 def test_a_checkpoint_without_its_hyperparametersis_of_nobody_knows_what(command, tmp_path, capsys):

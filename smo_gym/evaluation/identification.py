@@ -51,7 +51,7 @@ def cost(problem: Problem, points: Array, hypothesis: Hypothesis) -> Array:
 
 
 class Search:
-    """CMA-ES from one start; its whole state is data, so that it can be interrupted and resumed.
+    """CMA-ES from one start. It draws from one generator, so what it has found so far follows from the costs alone.
 
     Args:
         problem: the published numbers.
@@ -59,13 +59,21 @@ class Search:
         seed: of the search, and of its start where none is given.
         start: where to begin, on the log10 scale, instead of at random.
         population: candidates a generation.
+        costs: those of an interrupted search, a list of ``population`` numbers a generation: it goes on from there.
 
     Raises:
+        ValueError: the costs are not of such a search.
         ImportError: the package cma is missing.
     """
 
     def __init__(
-        self, problem: Problem, hypothesis: Hypothesis, seed: int, start: Array | None = None, population: int = 12
+        self,
+        problem: Problem,
+        hypothesis: Hypothesis,
+        seed: int,
+        start: Array | None = None,
+        population: int = 12,
+        costs: Sequence[Sequence[float]] = (),
     ) -> None:
         try:
             import cma
@@ -84,11 +92,19 @@ class Search:
         self.best = self._generator.uniform(low, high) if start is None else start
         # a random start looks about; from the best settings of another hypothesis the way is shorter
         self.strategy: Any = cma.CMAEvolutionStrategy(self.best, 0.3 if start is None else 0.05, options)
-        self.rms, self.generations = math.inf, 0
+        self.rms = math.inf
+        self.costs: list[list[float]] = []
+        """RMS of each candidate, generation by generation."""
+        for row in costs:
+            known = np.array(row, dtype=np.float64)
+            if known.shape != (population,):
+                raise ValueError(f"a generation has {known.size} costs, it must have {population}")
+            self._tell(np.array(self.strategy.ask()), known)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """All but the problem, which a resumed search is given anew."""
-        return {**self.__dict__, "problem": None}
+    @property
+    def generations(self) -> int:
+        """How many there have been."""
+        return len(self.costs)
 
     def _normal(self, *shape: int) -> Array:
         return self._generator.standard_normal(shape)
@@ -96,9 +112,11 @@ class Search:
     def step(self) -> None:
         """One generation."""
         points = np.array(self.strategy.ask())
-        costs = cost(self.problem, points, self.hypothesis)
+        self._tell(points, cost(self.problem, points, self.hypothesis))
+
+    def _tell(self, points: Array, costs: Array) -> None:
         self.strategy.tell(list(points), (costs**2).tolist())
-        self.generations += 1
+        self.costs.append(costs.tolist())
         i = int(costs.argmin())
         if costs[i] < self.rms:
             self.best, self.rms = points[i], float(costs[i])

@@ -14,11 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from safetensors import SafetensorError
 from safetensors.numpy import load as read_tensors
 from safetensors.numpy import save as tensor_bytes
-from scipy.special import expit
 
 from ..envs.task import HANGING
 from ..evaluation import files
-from ..validation import choice
+from ..validation import choice, short
+from .forward import affine, sigmoid, tanh
 from .observations import KINDS, scaled
 
 Array = NDArray[np.float64]
@@ -127,12 +127,13 @@ class MlpPolicy:
         Raises:
             ValueError: the observation is of another environment or lacks its observer.
         """
-        frame = scaled(self._seen(np.asarray(observation)), np.array(self.card.units))
-        inputs, state = self._remember(np.atleast_2d(frame), state, episode_start)
+        frame = scaled(self._seen(observation), np.array(self.card.units))
+        seen, state = self._remember(np.atleast_2d(frame), state, episode_start)
+        inputs = seen.T
         for W, b in self.layers[:-1]:
-            inputs = np.tanh(inputs @ W.T + b)
+            inputs = tanh(affine(W, inputs, b))
         W, b = self.layers[-1]
-        u = self.card.force_limit * np.clip(inputs @ W.T + b, -1.0, 1.0)
+        u = self.card.force_limit * np.clip(affine(W, inputs, b), -1.0, 1.0).T
         return (u if frame.ndim == 2 else u[0]), state
 
     def _remember(
@@ -144,13 +145,18 @@ class MlpPolicy:
         frames = stacked(frame, self.card.frames, None if state is None else state[0], episode_start)
         return frames.reshape(len(frame), -1), (frames,)
 
-    def _seen(self, observation: Array) -> Array:
-        size, given = len(self.card.units), observation.shape[-1]
-        allowed = (size,) if KINDS[self.card.observation].observer else (size, size + 4)
-        if given not in allowed:
+    def _seen(self, given: Any) -> Array:
+        try:
+            observation = np.asarray(given, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"observation={short(given)} must be an array of numbers") from None
+        size, observed = len(self.card.units), KINDS[self.card.observation].observer
+        allowed = (size,) if observed else (size, size + 4)
+        if observation.ndim not in (1, 2) or observation.shape[-1] not in allowed:
+            way_out = ": wrap it in smo_gym.ObserverWrapper or smo_gym.VectorObserverWrapper" if observed else ""
             raise ValueError(
                 f"observation has shape {observation.shape}: this policy of {self.card.environment} sees "
-                f"{self.card.observation!r}, {' or '.join(map(str, allowed))} entries"
+                f"{self.card.observation!r}, {' or '.join(map(str, allowed))} entries{way_out}"
             )
         return observation[..., :size]
 
@@ -174,7 +180,7 @@ class MlpPolicy:
             ValueError: a file is missing, corrupt, or does not fit the other; it is named.
         """
         path = Path(path)
-        beside = path.with_suffix(".json")
+        beside, weights = path.with_suffix(".json"), _read(path)  # the file that was named is the first to be missed
         try:
             card = Card.model_validate_json(_read(beside))
         except ValidationError as error:
@@ -184,7 +190,7 @@ class MlpPolicy:
                 f"{beside}: is no card of a policy ({place + ': ' if place else ''}{first['msg']})"
             ) from None
         try:
-            tensors = read_tensors(_read(path))
+            tensors = read_tensors(weights)
         except (SafetensorError, KeyError) as error:  # KeyError: a type that NumPy lacks
             raise ValueError(f"{path}: is corrupt or no safetensors file that NumPy can hold ({error})") from None
         count = len(card.layers) - 1
@@ -248,9 +254,10 @@ class LstmPolicy(MlpPolicy):
         W, U, b, d = self.lstm
         h, c = state or (np.zeros((len(frame), U.shape[1])),) * 2
         keep = ~_starts(episode_start)[..., None]
-        i, f, g, o = np.split(frame @ W.T + b + (h * keep) @ U.T + d, 4, axis=1)
-        c = expit(f) * c * keep + expit(i) * np.tanh(g)
-        h = expit(o) * np.tanh(c)
+        gates = affine(U, (h * keep).T, affine(W, frame.T, b + d))
+        i, f, g, o = np.split(gates.T, 4, axis=1)
+        c = sigmoid(f) * c * keep + sigmoid(i) * tanh(g)
+        h = sigmoid(o) * tanh(c)
         return h, (h, c)
 
     def _memory(self) -> dict[str, Array]:

@@ -13,7 +13,7 @@ import gymnasium
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from ..evaluation import files
-from ..validation import choice, mapping, number
+from ..validation import choice, mapping, number, whole
 from .measurement import TRAINING, seeds
 from .observations import KINDS, VectorAgentView
 from .sb3 import SB3VecEnv
@@ -70,8 +70,7 @@ class Run:
         )
         counts = {"n_envs": self.n_envs, "n_timesteps": self.steps, "n_steps": given.get("n_steps")}
         for name, value in (counts | {name: given[name] for name in WHOLE if name in given}).items():
-            if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-                raise ValueError(f"{name}={value!r} must be a whole number of at least 1")
+            whole(name, value, 1)
         if not isinstance(given.get("policy_kwargs", {}), dict):
             raise ValueError(f"policy_kwargs={given['policy_kwargs']!r} must be a mapping, such as {{net_arch: [64]}}")
         built(self)
@@ -109,9 +108,10 @@ def load(
         if not isinstance(options, dict):
             raise ValueError(f"{environment}: env_kwargs={options!r} must be a mapping of the environment's options")
         options = options | ({} if uncertainty is None else {"uncertainty": uncertainty})
+        for name in ("n_envs", "n_timesteps", *WHOLE):
+            if isinstance(given.get(name), float) and given[name].is_integer():  # YAML says 1e6, the zoo !!float 1e6
+                given[name] = int(given[name])
         n_envs, n_timesteps = given.pop("n_envs"), given.pop("n_timesteps")
-        if isinstance(n_timesteps, float) and n_timesteps.is_integer():  # the zoo's own files say !!float 1e6
-            n_timesteps = int(n_timesteps)
         length = n_timesteps if steps is None else steps
         return Run(environment, observation or kind, algorithm, seed, length, n_envs, options, given).checked()
     except (ValueError, TypeError, gymnasium.error.Error) as error:

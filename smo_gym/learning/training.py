@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
-import os
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -14,13 +14,15 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from ..evaluation import files
+from ..validation import short
 from .measurement import TRAINING, VALIDATION, measure, seeds
 from .observations import KINDS, units
 from .policy import Card, LstmPolicy, MlpPolicy
 from .sb3 import SB3VecEnv, layers, lstm_weights
-from .settings import ALGORITHMS, Run, learner, make
+from .settings import Run, learner, make
 
 try:
+    import torch
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.vec_env import VecMonitor
 except ImportError as error:
@@ -87,9 +89,7 @@ class Watch(BaseCallback):
         self.model.curve = [*before, {"steps": self.num_timesteps, **found}]  # type: ignore[attr-defined]
         for name, value in found.items():
             self.logger.record(f"validation/{name}", value)
-        half = self._checkpoint.with_suffix(".half.zip")
-        self.model.save(half)
-        os.replace(half, self._checkpoint)
+        files.write_bytes(self._checkpoint, state_bytes(self.model))
         self._progress(self.num_timesteps, found)
 
     def _restart(self) -> None:
@@ -104,6 +104,38 @@ class Watch(BaseCallback):
 
     def _on_step(self) -> bool:
         return True
+
+
+def state_bytes(model: Any) -> bytes:
+    """What a model has learned so far, as tensors and numbers: all that :func:`restore` needs beside the run."""
+    policy = model.policy
+    found = {
+        "policy": policy.state_dict(),
+        "optimizer": policy.optimizer.state_dict(),
+        "num_timesteps": model.num_timesteps,
+        "n_updates": model._n_updates,
+        "curve": curve(model),
+    }
+    file = io.BytesIO()
+    torch.save(found, file)
+    return file.getvalue()
+
+
+def restore(model: Any, path: Path) -> None:
+    """Bring a model that has not learned to a checkpoint; tensors and numbers are read, no code is run.
+
+    Raises:
+        ValueError: the file cannot be read, or is of a model of another form.
+    """
+    try:
+        found = torch.load(path, map_location="cpu", weights_only=True)
+        model.policy.load_state_dict(found["policy"])
+        model.policy.optimizer.load_state_dict(found["optimizer"])
+        model.num_timesteps, model._n_updates = int(found["num_timesteps"]), int(found["n_updates"])
+        model.curve = [{name: float(value) for name, value in point.items()} for point in found["curve"]]
+    except Exception as error:  # whatever a damaged file may raise
+        reason = str(error).strip().splitlines() or [type(error).__name__]
+        raise ValueError(f"{path}: cannot be read ({reason[0]}): remove it to begin anew") from None
 
 
 def curve(model: Any) -> list[dict[str, float]]:
@@ -138,19 +170,15 @@ def train(
         ValueError: hyperparameters that nothing can be made of, or a network that cannot be frozen; the folder holds
             a run of other settings, or a checkpoint that cannot be read or stands alone.
     """
-    checkpoint = folder / "checkpoint.zip"
+    checkpoint = folder / "checkpoint.pt"
     env = VecMonitor(SB3VecEnv(make(run, run.n_envs, AutoresetMode.SAME_STEP)))
     log = str(folder / "tensorboard") if tensorboard else None
     begun = checkpoint.exists()
-    if not begun:
-        model = learner(run, env, log)
-        frozen(model, run)  # what cannot be frozen is noticed now, not at the first checkpoint
+    model = learner(run, env, log)
+    frozen(model, run)  # what cannot be frozen is noticed now, not at the first checkpoint
     agree(folder / "run.json", asdict(run), begun)
     if begun:
-        try:
-            model = ALGORITHMS[run.algorithm].load(checkpoint, env=env, device="cpu", tensorboard_log=log)
-        except Exception as error:  # whatever a damaged zip and pickle may raise
-            raise ValueError(f"{checkpoint}: cannot be read ({error}): remove it to begin anew") from None
+        restore(model, checkpoint)
     watch = Watch(run, checkpoint, progress)
     progress(model.num_timesteps, {})
     if model.num_timesteps < run.steps:
@@ -180,9 +208,22 @@ def agree(path: Path, settings: dict[str, Any], begun: bool) -> None:
             f"{path}: cannot be read ({error}): it says what run the checkpoint is of; empty the folder to begin anew"
         ) from None
     if found != wanted:
+        there, here = _flat(found), _flat(wanted)
         differences = [
-            f"{name} is {found.get(name)!r} there and {wanted.get(name)!r} here"
-            for name in wanted | found
-            if found.get(name) != wanted.get(name)
+            f"{name} is {short(there[name]) if name in there else 'missing'} there and "
+            f"{short(here[name]) if name in here else 'missing'} here"
+            for name in there | here
+            if there.get(name) != here.get(name) or (name in there) != (name in here)
         ]
-        raise ValueError(f"{path.parent} holds a run with another configuration: {'; '.join(differences)}")
+        raise ValueError(
+            f"{path.parent} holds a run with another configuration: {'; '.join(differences)}. Choose another --out, or "
+            "remove that folder to begin anew"
+        )
+
+
+def _flat(data: dict[str, Any], above: str = "") -> dict[str, Any]:
+    """Nested mappings as one, with dotted names."""
+    found: dict[str, Any] = {}
+    for name, value in data.items():
+        found |= _flat(value, f"{above}{name}.") if isinstance(value, dict) else {f"{above}{name}": value}
+    return found

@@ -31,7 +31,10 @@ SIZES = {6: "smo", 2: "positions", 2 * KINDS["stacked"].frames: "stacked"}
 
 @dataclass(frozen=True)
 class ZipPolicy:
-    """u = force_limit a, with the deterministic action a in [-1, 1] of a Stable-Baselines3 policy."""
+    """u = force_limit a, with the deterministic action a in [-1, 1] of a Stable-Baselines3 policy.
+
+    torch sums in an order that depends on the batch: the last bits of an action may differ between batches.
+    """
 
     policy: Any
     frames: int
