@@ -16,7 +16,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from . import charts, files, tables
+from . import charts, files, formats, tables
 from .packing import CHANNELS, LEVELS, pack, runs_that_fit
 from .panels import WINDOW
 from .sources import sources
@@ -127,11 +127,12 @@ def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
     assert outcome.plants is not None
     return {
         **where,
-        "table": group.scenario.table,
-        "title": group.scenario.title,
-        "controller": group.name,
+        "table": formats.line(group.scenario.table),
+        "title": formats.line(group.scenario.title),
+        "controller": formats.line(group.name),
+        "name": tables.title(group.name),
         "uncertainty": f"{100 * group.uncertainty:.10g} %",
-        "case": group.case,
+        "case": formats.line(group.case),
         "start": [float(value) for value in group.scenario.initial_states.value[group.case]],
         "arm": group.arm,
         "period": float(traces.time[1]) if len(traces.time) > 1 else 1.0,
@@ -153,8 +154,9 @@ def _tables(outcomes: Sequence[Outcome], results: Iterable[Result]) -> list[dict
         cells = [r for r in rows if r.cell.metric in ("mse", "rms")]
         found.append(
             {
-                "table": table,
-                "controller": name,
+                "table": formats.line(table),
+                "controller": formats.line(name),
+                "name": tables.title(name),
                 "title": titles[table, name],
                 "verdict": tables.verdict(rows),
                 "rows": [
