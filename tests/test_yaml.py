@@ -96,6 +96,11 @@ def test_scenarios_of_absurd_sizes_are_refused_at_once(tmp_path, text, message):
     assert message in refused(tmp_path / "a.yaml", REGULATION + text, scenario.load)
 
 
+def test_a_copied_scenario_says_where_it_looks_for_the_other_file(tmp_path):
+    text = (ROOT / "configs" / "regulation.yaml").read_text(encoding="utf-8")
+    assert "extends='article.yaml' is no file: it must be named" in refused(tmp_path / "a.yaml", text, scenario.load)
+
+
 def test_a_chain_of_files_has_an_end(tmp_path):
     for i in range(30):
         (tmp_path / f"{i}.yaml").write_text(f"extends: {i + 1}.yaml\n")

@@ -44,6 +44,10 @@ def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     if not isinstance(base, str):
         raise ValueError(f"{path}: extends={short(base)} must be the name of a file")
     above = (*above, path.resolve())
+    if not (path.parent / base).is_file():
+        raise ValueError(
+            f"{path}: extends={short(base)} is no file: it must be named as it is found from {path.parent}/"
+        )
     if (path.parent / base).resolve() in above:
         raise ValueError(f"{path}: extends itself")
     if len(above) > MOST_FILES:

@@ -76,7 +76,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         "scatter": charts.scatter(results),
         "bars": charts.bars(results),
     }
-    return environment.get_template("page.html").render(
+    page_text = environment.get_template("page.html").render(
         style=Markup((page / "page.css").read_text(encoding="utf-8")),
         scripts=Markup("\n".join((page / name).read_text(encoding="utf-8") for name in _SCRIPTS)),
         plotly=base64.b64encode(zlib.compress(get_plotlyjs().encode(), 9)).decode("ascii"),
@@ -106,6 +106,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         command=command,
         versions=versions,
     )
+    return page_text.encode("utf-8", "replace").decode("utf-8")  # a path need not be text
 
 
 def _json(figures: Mapping[str, Any]) -> str:

@@ -77,6 +77,8 @@ def title(controller: str) -> str:
 def summary(results: Sequence[Result]) -> str:
     """How many published MSE cells are met."""
     cells = [r for r in results if r.cell.metric == "mse" and not r.cell.is_average and math.isfinite(r.deviation)]
+    if not cells:
+        return "No published MSE cell to compare with."
     near = sum(abs(math.expm1(r.deviation)) <= 0.1 for r in cells)
     inside = sum(r.ci_low <= r.published <= r.ci_high for r in cells)
     foreseen = sum(abs(r.published - r.measured) <= r.half_width for r in cells)
