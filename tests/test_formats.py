@@ -94,6 +94,14 @@ def test_latex_keeps_every_line_whole(measured):
     assert re.search(r"\d+ of \d+ runs failed\.", text)
 
 
+def test_matplotlib_draws_names_as_they_are():
+    matplotlib = pytest.importorskip("matplotlib.figure")
+    figure = matplotlib.Figure()
+    for name in [*NAMES, "$\\nothing$"]:
+        figure.text(0.0, 0.0, formats.mathtext(name))
+    figure.canvas.draw()
+
+
 def test_markdown_shows_names_as_they_are(measured):
     text = tables.render(statistics.results(measured), "github", rms=False)
     assert r"## Table a\|b\*c\*\_d\_\`e\`, =1+1" in text

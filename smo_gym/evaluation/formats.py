@@ -30,6 +30,11 @@ def markdown(text: str) -> str:
     return re.sub(r"[\\`*_<>|~&#$]|\](?=\()", r"\\\g<0>", line(text))
 
 
+def mathtext(text: str) -> str:
+    """A text as Matplotlib draws it, without formulas."""
+    return line(text).replace("$", r"\$")
+
+
 def escaped(text: str, form: str) -> str:
     """A text in a format of tabulate: as LaTeX, as Markdown or, on a console, as one line."""
     return latex(text) if form.startswith("latex") else markdown(text) if form == "github" else line(text)
