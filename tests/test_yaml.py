@@ -71,6 +71,7 @@ def test_numbers_are_those_of_yaml_1_2(tmp_path):
     [
         ("horizon: {value: 1e6, source: chosen}", "horizon.value: Input should be less than or equal to 100000"),
         ("control_period: {value: 1e6, source: chosen}", "control_period.value: Input should be less than"),
+        ('initial_states: {value: {"": [1e12, 0, 0, 0]}, source: chosen}', "less than or equal to 10000"),
         ('horizon: {value: "nan", source: chosen}', "horizon.value: Input should be a finite number"),
         (f"title: {'x' * 100_000}", "title: String should have at most 200 characters (given 'xxx"),
         (f"environment: {'x' * 150}", "xxx"),

@@ -31,6 +31,7 @@ from .settings import (
     PolicySettings,
     ReferenceSettings,
     Setting,
+    State,
     Strict,
     TheoremSettings,
 )
@@ -53,7 +54,7 @@ class Scenario(Strict):
     force_limit: Setting[float | None]
     track_limit: Setting[float | None]
     uncertainty: Setting[Annotated[tuple[Fraction, ...], Field(min_length=1)]]
-    initial_states: Setting[Annotated[dict[Name, Four], Field(min_length=1)]]
+    initial_states: Setting[Annotated[dict[Name, State], Field(min_length=1)]]
     controllers: Annotated[dict[Name, ControllerSettings], Field(min_length=1)]
     designed: DesignSettings | None = None
     reference: ReferenceSettings | None = None

@@ -16,6 +16,9 @@ from .rollout import Agent
 
 T = TypeVar("T")
 Four = tuple[float, float, float, float]
+Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
+State = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+"""m, rad, m/s, rad/s."""
 Fraction = Annotated[float, Field(ge=0.0, lt=1.0)]
 Name = Annotated[str, Field(max_length=200)]
 Horizon = Annotated[float, Field(le=1e5)]
@@ -64,7 +67,7 @@ class ObserverSettings(Strict):
 
     gains: Setting[str | dict[str, tuple[float, float]]]
     slopes: Setting[tuple[float, float]]
-    xhat0: Setting[Four]
+    xhat0: Setting[State]
     time_constant: Setting[float] = Setting[float](value=0.0, source="chosen")
     step: Setting[Step | None] = Setting[Step | None](value=None, source="chosen")
 
@@ -175,7 +178,7 @@ class DesignSettings(Strict):
 class TheoremSettings(DesignSettings):
     """The runs that test a design: ``agents/theorem.py``."""
 
-    starts: Setting[tuple[Four, Four]]
+    starts: Setting[tuple[State, State]]
     horizon: Setting[Horizon]
     settle: Setting[float]
     gains: Setting[dict[str, tuple[float, float]]] | None = None
@@ -195,6 +198,6 @@ class TheoremSettings(DesignSettings):
 class ReferenceSettings(Strict):
     """The minimum-energy reference of a tracking scenario, from its initial state, over its horizon."""
 
-    end: Setting[Four]
+    end: Setting[State]
     force_limit: Setting[float]
     elements: Setting[Annotated[int, Field(ge=1, le=10_000)]]
