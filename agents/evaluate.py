@@ -55,6 +55,14 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         **several(one_of("scenario", (*SCENARIOS, "all"))),
         help="regulation (Table 4), initial-conditions (Table 5), tracking (Table 7) or all (default)",
     )
+    add(
+        "--import",
+        dest="modules",
+        nargs="+",
+        default=[],
+        metavar="MODULE",
+        help="that registers environments of your own",
+    )
     add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
     add(
         "--uncertainty",
@@ -93,7 +101,7 @@ def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
         raise ValueError(f"--scenario {' '.join(arguments.scenario)} and --config {arguments.config}: give one of them")
     names = SCENARIOS if "all" in (arguments.scenario or ["all"]) else dict.fromkeys(arguments.scenario)
     paths = [arguments.config] if arguments.config else [CONFIGS / f"{name}.yaml" for name in names]
-    found = [scenario.load(path) for path in paths]
+    found = [scenario.load(path, arguments.controller) for path in paths]
     if arguments.uncertainty is not None:
         wanted = tuple(dict.fromkeys(arguments.uncertainty))
         levels = scenario.Setting[tuple[float, ...]](value=wanted, source="chosen", note="command line")
@@ -148,6 +156,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     args = parse(arguments)
     began = time.perf_counter()
     sys.path.append(os.getcwd())  # where an agent of one's own usually is
+    for module in args.modules:
+        agents.imported(module)
     scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
     arms = chosen_arms(args.observer, args.compensation)
     groups = study.groups(scenarios, controllers, arms, args.runs)

@@ -22,7 +22,7 @@ from tqdm import tqdm
 from smo_gym.cli.arguments import Parser, whole
 from smo_gym.cli.entry import command
 from smo_gym.evaluation import files, scenario, study
-from smo_gym.evaluation.tables import as_csv
+from smo_gym.evaluation.formats import as_csv
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "upright.yaml"
 RESULTS = ("falls.csv", "falls.md")

@@ -26,7 +26,7 @@ def select(rows, table, controller, metric, average):
         row
         for row in rows
         if (row["table"], row["controller"], row["metric"]) == (table, controller, metric)
-        and ("average" in (row["case"], row["uncertainty_percent"])) == average
+        and (row["row"] == "average") == average
     ]
 
 

@@ -38,7 +38,7 @@ CONFIGS = Path(__file__).resolve().parent.parent / "configs"
         ({"gamma": 7}, "gamma=7 must be a number from 0 to 1"),
         ({"gamma": "x"}, "gamma='x' must be a number"),
         ({"gamma": None}, "gamma=None must be a number"),
-        ({"learning_rate": float("nan")}, "learning_rate=nan must be"),
+        ({"learning_rate": float("nan")}, "'.nan' is no finite number"),
         ({"learning_rate": "lin_nan"}, "learning_rate='lin_nan' must be"),
         ({"learning_rate": "lin_fast"}, "learning_rate='lin_fast' must be"),
     ],

@@ -13,7 +13,7 @@ import pytest
 import yaml
 from stable_baselines3 import PPO, SAC
 
-from smo_gym import LQR, SlidingModeObserver
+from smo_gym import SlidingModeObserver
 from smo_gym.evaluation import scenario
 from smo_gym.learning.observations import KINDS, agent_view
 from smo_gym.learning.policy import Card, MlpPolicy
@@ -156,17 +156,53 @@ def test_models_of_stable_baselines3_act_as_their_library_says(here):
     assert len(runs("--controller", "a.zip", "b.zip", "lqr")) == 3
 
 
-def test_a_scenario_names_agents_too(here):
+def named_in_a_scenario(here, **changes):
+    """A scenario file with controllers whose agents have these names."""
     data = yaml.safe_load((here / "short.yaml").read_text())
     smc = yaml.safe_load((ROOT / "configs" / "article.yaml").read_text())["controllers"]["smc"]
-    data["controllers"] = {"mine": {"law": "policy", "agent": "twins:Twin", "observer": smc["observer"]}}
+    data["controllers"] = {
+        name: {"law": "policy", "agent": agent, "observer": smc["observer"]} for name, agent in changes.items()
+    }
     (here / "own.yaml").write_text(yaml.safe_dump(data))
-    found = runs("--controller", "mine", "lqr", config="own.yaml")
-    assert found["mine"] != found["lqr"]
-    data["controllers"]["mine"]["agent"] = "twins:Twi"
-    (here / "own.yaml").write_text(yaml.safe_dump(data))
-    with pytest.raises(ValueError, match=r"own\.yaml: unknown class in twins 'Twi': did you mean 'Twin'"):
-        scenario.load(Path("own.yaml"))
+    return "own.yaml"
+
+
+def test_a_scenario_names_trained_policies_too(here):
+    linear("a.safetensors")
+    found = runs(
+        "--controller", "mine", "theirs", "lqr", config=named_in_a_scenario(here, mine="a.safetensors", theirs="ppo")
+    )
+    assert found["mine"] != found["theirs"] != found["lqr"]
+
+
+@pytest.mark.parametrize("agent", ["a.zip", "twins:Twin", "twins:Twin.safetensors.zip", "twins", "A.ZIP", ""])
+def test_a_scenario_runs_no_code(here, agent, capsys):
+    (here / "twins.py").write_text("import pathlib\npathlib.Path('ran').touch()\n" + TWIN)
+    config = named_in_a_scenario(here, mine=agent)
+    for controller in ("mine", "lqr"):  # chosen or not
+        assert evaluate.main(["--config", config, "--controller", controller]) == 2
+        error = capsys.readouterr().err
+        assert "controllers.mine.policy.agent: a file may name ppo or PATH.safetensors alone" in error
+        assert "--controller PATH.zip or module:Class" in error
+        assert error.count("\n") == 1
+    assert not (here / "ran").exists()
+    (here / "own.yaml").write_text(f"extends: {ROOT}/configs/regulation.yaml\nenvironment: twins:SMOPendulum-v0\n")
+    assert evaluate.main(["--config", config]) == 2
+    error = capsys.readouterr().err
+    assert "environment: a file may not name a module to import: say 'SMOPendulum-v0', and --import twins" in error
+    assert error.count("\n") == 1
+    assert not (here / "ran").exists()
+    assert evaluate.main(["--config", "short.yaml", "--import", "twins", "--controller", "lqg"]) == 2
+    assert (here / "ran").exists()  # whoever names it on the command line wants it
+
+
+def test_no_other_policy_is_opened_than_those_that_run(here):
+    config = named_in_a_scenario(here, mine="none.safetensors")
+    assert set(runs("--controller", "lqr", config=config)) == {"lqr"}
+    for controller in ("mine", "policy", "all"):
+        assert evaluate.main(["--config", config, "--controller", controller]) == 2
+    with pytest.raises(ValueError, match=r"own\.yaml: none\.json: cannot be read"):
+        scenario.load(Path(config))
 
 
 def test_who_cannot_act_somewhere_is_left_out_there(here, capsys):
@@ -256,4 +292,4 @@ def test_the_pages_agent_runs_as_it_stands(here, monkeypatch, capsys):
     assert failed == "0"
     (settings,) = re.findall(r"```yaml(?: title=.+?)?\n(.*?)```", PAGE, re.DOTALL)
     (here / "mine.yaml").write_text(settings.replace("configs/", f"{ROOT}/configs/"))
-    assert isinstance(scenario.load(Path("mine.yaml")).agent("mine").law, LQR)
+    assert isinstance(scenario.load(Path("mine.yaml")).agent("mine"), MlpPolicy)

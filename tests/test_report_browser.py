@@ -158,6 +158,14 @@ def test_the_bob_hangs_below_the_cart_or_stands_above(opened):
         assert sign * (bob - cart) > 20
 
 
+def test_no_button_sends_a_figure_away(opened):
+    page = opened()
+    for plot in ("#curves", "#bars", "#scatter"):
+        titles = page.locator(f"{plot} .modebar-btn").evaluate_all("all => all.map((one) => one.dataset.title)")
+        assert len(titles) == 6
+        assert not re.search("share|cloud|edit|upload", " ".join(titles), re.IGNORECASE)
+
+
 def test_filters_change_the_tables(opened, report):
     page = opened()
     cells = page.locator(".cells tr[data-arm]:visible")

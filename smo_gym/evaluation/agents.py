@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Sequence
+from types import ModuleType
 from typing import TYPE_CHECKING, cast
 
 from ..learning import BASELINES, shipped
@@ -20,6 +21,11 @@ SHIPPED = "ppo"
 def named(text: str) -> bool:
     """Whether a text has the form of an agent's name for :func:`load`."""
     return text == SHIPPED or text.endswith((".safetensors", ".zip")) or ":" in text
+
+
+def is_data(name: str) -> bool:
+    """Whether an agent is data alone: to load it runs no code, so that a file may name it."""
+    return name == SHIPPED or name.endswith(".safetensors")
 
 
 def load(name: str, environment: str) -> Agent:
@@ -73,12 +79,24 @@ def entered(scenarios: Sequence[Scenario], agent: str) -> tuple[list[Scenario], 
     return more, [f"left out of {title}: {reason}" for title, reason in reasons.items()]
 
 
+def imported(name: str) -> ModuleType:
+    """A user's module.
+
+    Raises:
+        ValueError: whatever it raises.
+    """
+    try:
+        return importlib.import_module(name)
+    except (Exception, SystemExit) as error:
+        raise ValueError(f"cannot import {name!r} ({type(error).__name__}: {error})") from error
+
+
 def _own(name: str) -> Agent:
     module_name, _, attribute = name.partition(":")
     try:
-        module = importlib.import_module(module_name)
-    except (Exception, SystemExit) as error:  # whatever a user's module may raise
-        raise ValueError(f"{name}: cannot import {module_name!r} ({type(error).__name__}: {error})") from error
+        module = imported(module_name)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
     made = getattr(module, attribute, None)
     if not callable(made):
         known = [word for word, value in vars(module).items() if isinstance(value, type) and not word.startswith("_")]

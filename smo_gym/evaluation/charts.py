@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from . import tables
+from . import formats, tables
 from .statistics import Result
 from .study import ARMS
 
@@ -104,9 +104,10 @@ def scatter(results: Sequence[Result]) -> Figure | None:
                         error_y=_interval(chosen) | {"thickness": 1, "width": 0, "color": COLOURS[arm]},
                         mode="markers",
                         marker={"symbol": symbol, "size": 8, "color": COLOURS[arm], "opacity": 0.85},
-                        name=html.escape(f"{name.upper()}, {arm}"),
+                        name=html.escape(f"{tables.title(name)}, {arm}"),
                         text=[
-                            html.escape(f"Table {r.cell.table}, {tables.label(r.cell)}, {r.cell.state}") for r in chosen
+                            html.escape(formats.line(f"Table {r.cell.table}, {tables.label(r.cell)}, {r.cell.state}"))
+                            for r in chosen
                         ],
                         hovertemplate="%{text}<br>published %{x:.4g}<br>measured %{y:.4g}",
                     )
@@ -119,7 +120,7 @@ def scatter(results: Sequence[Result]) -> Figure | None:
 def bars(results: Sequence[Result]) -> dict[str, Figure]:
     """MSE of h above that of theta for each table and controller: published hatched, measured filled."""
     return {
-        f"Table {table}, {name.upper()}": _bars([r for r in rows if r.cell.metric == "mse"])
+        f"Table {formats.line(table)}, {tables.title(name)}": _bars([r for r in rows if r.cell.metric == "mse"])
         for (table, name), rows in tables.by_table(results).items()
     }
 
@@ -132,7 +133,7 @@ def _bars(cells: Sequence[Result]) -> Figure:
     for row, state in ((1, "h"), (2, "theta")):
         for arm in ARMS:
             chosen = [r for r in cells if (r.cell.state, r.cell.compensation) == (state, arm)]
-            places = [html.escape(tables.label(r.cell)) for r in chosen]
+            places = [html.escape(formats.line(tables.label(r.cell))) for r in chosen]
             look = {"x": places, "legendgroup": arm, "showlegend": row == 1}
             if any(math.isfinite(r.published) for r in chosen):
                 hatched = {"color": COLOURS[arm], "pattern": {"shape": "/", "fillmode": "replace", "size": 5}}

@@ -12,6 +12,8 @@ from typing import Any
 
 import yaml
 
+from . import yaml_text
+
 _PART = ".smo_gym-"  # a name of what is not complete yet begins so
 _COMPLETE = ".smo_gym.complete"  # a set of files that waits for its place
 _ORDER = ".order"  # which files of an old set go, which come, in turn
@@ -21,14 +23,31 @@ def read_yaml(path: Path) -> Any:
     """What a YAML file holds.
 
     Raises:
-        ValueError: it cannot be read or is not YAML; the file is named.
+        ValueError: it cannot be read, is not YAML or more than settings are (:mod:`~smo_gym.evaluation.yaml_text`); the
+            file is named.
     """
+    most = yaml_text.MOST_CHARACTERS
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
+        with path.open(encoding="utf-8") as file:
+            text = file.read(most + 1)
+        if len(text) > most:
+            raise ValueError(f"{path}: has more than {most:,} characters, which no settings need")
     except OSError as error:
         raise ValueError(f"{path}: cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, ValueError) as error:  # a ValueError is of bytes that are no text, or of no date
-        raise ValueError(f"{path}: is not YAML ({' '.join(str(error).split())})") from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: is not YAML ({error})") from None
+    try:
+        return yaml_text.load(text)
+    except yaml_text.Unsuitable as error:
+        raise ValueError(f"{path}: {error}") from None
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError) as error:  # !!bool maybe is a KeyError
+        raise ValueError(f"{path}: is not YAML ({shortened(str(error))})") from None
+
+
+def shortened(text: str, most: int = 400) -> str:
+    """A message as one line that can be read."""
+    line = " ".join(text.split())
+    return line if len(line) <= most else f"{line[: most // 2]} ... {line[5 - most // 2 :]}"
 
 
 def prepare(folder: Path, option: str = "--out", names: Iterable[str] = ()) -> Path:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from .formats import mathtext
 from .rollout import Traces
 from .statistics import Result
 from .study import Outcome
@@ -116,7 +117,8 @@ def bars(columns: Mapping[str, Sequence[Result]], label: str) -> Figure:
 def _bars(panel: Axes, name: str, cells: Sequence[Result]) -> None:
     """Beside each other: without published, without measured, with published, with measured."""
     places = [
-        ", ".join(filter(None, (r.cell.case and f"case {r.cell.case}", r.cell.uncertainty_percent))) for r in cells
+        ", ".join(filter(None, (r.cell.case and f"case {mathtext(r.cell.case)}", r.cell.uncertainty_percent)))
+        for r in cells
     ]
     ticks = list(dict.fromkeys(places))
     bars = [(arm, kind) for arm in ARMS if any(r.cell.compensation == arm for r in cells) for kind in _BAR_KINDS]

@@ -22,7 +22,8 @@ from ..plant import CartPendulum
 from ..wrappers import VectorObserverWrapper
 from .identification import Hypothesis
 from .rollout import Agent, rollout
-from .scenario import LqrSettings, Scenario, Setting, SmcSettings
+from .scenario import Scenario
+from .settings import LqrSettings, Setting, SmcSettings
 from .study import deviations as draws
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from . import charts, files, tables
+from . import charts, files, formats, tables
 from .packing import CHANNELS, LEVELS, pack, runs_that_fit
 from .panels import WINDOW
 from .sources import sources
@@ -76,7 +76,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         "scatter": charts.scatter(results),
         "bars": charts.bars(results),
     }
-    return environment.get_template("page.html").render(
+    page_text = environment.get_template("page.html").render(
         style=Markup((page / "page.css").read_text(encoding="utf-8")),
         scripts=Markup("\n".join((page / name).read_text(encoding="utf-8") for name in _SCRIPTS)),
         plotly=base64.b64encode(zlib.compress(get_plotlyjs().encode(), 9)).decode("ascii"),
@@ -106,6 +106,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         command=command,
         versions=versions,
     )
+    return page_text.encode("utf-8", "replace").decode("utf-8")  # a path need not be text
 
 
 def _json(figures: Mapping[str, Any]) -> str:
@@ -127,11 +128,12 @@ def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
     assert outcome.plants is not None
     return {
         **where,
-        "table": group.scenario.table,
-        "title": group.scenario.title,
-        "controller": group.name,
+        "table": formats.line(group.scenario.table),
+        "title": formats.line(group.scenario.title),
+        "controller": formats.line(group.name),
+        "name": tables.title(group.name),
         "uncertainty": f"{100 * group.uncertainty:.10g} %",
-        "case": group.case,
+        "case": formats.line(group.case),
         "start": [float(value) for value in group.scenario.initial_states.value[group.case]],
         "arm": group.arm,
         "period": float(traces.time[1]) if len(traces.time) > 1 else 1.0,
@@ -153,8 +155,9 @@ def _tables(outcomes: Sequence[Outcome], results: Iterable[Result]) -> list[dict
         cells = [r for r in rows if r.cell.metric in ("mse", "rms")]
         found.append(
             {
-                "table": table,
-                "controller": name,
+                "table": formats.line(table),
+                "controller": formats.line(name),
+                "name": tables.title(name),
                 "title": titles[table, name],
                 "verdict": tables.verdict(rows),
                 "rows": [

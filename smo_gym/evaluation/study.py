@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from reprlib import repr as short
 from typing import Any
 
 import gymnasium
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..envs.task import Task
 from ..plant import STATE_NAMES, CartPendulum
+from ..validation import choice
 from ..wrappers import VectorObserverWrapper
 from .rollout import Traces, rollout
 from .scenario import ControllerSettings, Scenario
@@ -22,6 +24,9 @@ ARMS = ("without", "with", "theorem", "oracle")
 """Compensation of the input uncertainty off, on; gains designed for the theorem; the true state for an estimate."""
 TRACED_RUNS = 10
 """Of each group at most so many runs are traced, the first ones: as many as the article shows."""
+MOST_RUNS = 10_000_000
+MOST_SECONDS = 1_000_000_000
+"""Simulated: days of computing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +39,9 @@ class Group:
     case: str
     arm: str
     runs: int
+
+    def __post_init__(self) -> None:
+        choice("arm", self.arm, ARMS)
 
     @property
     def name(self) -> str:
@@ -78,9 +86,12 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
     """All groups of some scenarios, with the nominal plant (0 %, one run) beside the scenarios' own levels.
 
     Raises:
-        ValueError: an arm of designed gains is wanted of a scenario that says nothing of them.
+        ValueError: an unknown arm; one of designed gains is wanted of a scenario that says nothing of them; or more
+            runs than can be done.
     """
     scenarios = list(scenarios)
+    for arm in arms:
+        choice("arm", arm, ARMS)
     for scenario in scenarios:
         if "theorem" in arms and scenario.designed is None:
             raise ValueError(f"scenario {scenario.title!r} has no setting 'designed' for the theorem's gains")
@@ -88,7 +99,7 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
             raise ValueError(
                 f"uncertainty={scenario.uncertainty.value} is beyond what the theorem's gains are designed for"
             )
-    return [
+    found = [
         Group(scenario, controller, level, case, arm, runs if level > 0.0 else 1)
         for scenario in scenarios
         for controller in controllers
@@ -97,6 +108,12 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
         for case in scenario.initial_states.value
         for arm in arms
     ]
+    if sum(group.runs for group in found) > MOST_RUNS or simulated_seconds(found) > MOST_SECONDS:
+        raise ValueError(
+            f"runs={short(runs)}: in all {MOST_RUNS:,} runs and {MOST_SECONDS:,} simulated seconds are the most: take "
+            "fewer runs, levels or initial states, or a shorter horizon"
+        )
+    return found
 
 
 def deviations(seed: int, runs: int) -> Array:
@@ -127,16 +144,16 @@ def measure(
     """
     if samples is not None and samples < 1:
         raise ValueError(f"samples={samples!r} must be a positive integer")
-    options = {group.scenario.title: group.scenario.options for group in wanted}
+    options = {id(group.scenario): group.scenario.options for group in wanted}
     batches: dict[Any, list[int]] = {}
     for index, group in enumerate(wanted):
         scenario = group.scenario
-        key = (scenario.environment, repr(options[scenario.title]), repr(group.settings), _together(group.arm))
+        key = (scenario.environment, repr(options[id(scenario)]), repr(group.settings), _together(group.arm))
         batches.setdefault(key, []).append(index)
     outcomes: dict[int, Outcome] = {}
     for indices in batches.values():
         batch = [wanted[i] for i in indices]
-        found = _run(batch, options[batch[0].scenario.title], seed, progress, samples)
+        found = _run(batch, options[id(batch[0].scenario)], seed, progress, samples)
         outcomes.update(zip(indices, found, strict=True))
     return [outcomes[index] for index in range(len(wanted))]
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 
 import numpy as np
-from tabulate import LATEX_ESCAPE_RULES, tabulate
 
 from ..article import Cell
-from . import agents
+from . import formats
+from .formats import as_csv
 from .metrics import NAMES
 from .statistics import Result
 from .study import ARMS, Outcome
@@ -40,14 +39,14 @@ def render(results: Sequence[Result], form: str, *, rms: bool) -> str:
     """
     parts = []
     for (table, controller), rows in by_table(results).items():
-        parts.append(_heading(f"Table {table}, {title(controller)}", form))
+        parts.append(formats.heading(f"Table {table}, {title(controller)}", form))
         shown = [row for row in rows if row.cell.metric == "mse" or (rms and row.cell.metric == "rms")]
         parts.append(_table(form, HEADER, [cell_row(row) for row in shown]))
         reductions = [row for row in rows if row.cell.metric == REDUCTION]
         if reductions:
-            parts.append(_heading("Reduction of the MSE by the compensation", form, level=3))
+            parts.append(formats.heading("Reduction of the MSE by the compensation", form, level=3))
             parts.append(_table(form, REDUCTION_HEADER, [reduction_row(row) for row in reductions]))
-        parts.append(verdict(rows))
+        parts.append(formats.escaped(verdict(rows), form))
     return "\n\n".join(parts) + "\n"
 
 
@@ -72,7 +71,7 @@ def verdict(rows: Sequence[Result]) -> str:
 
 def title(controller: str) -> str:
     """A controller's name in capitals, a path or class as it is."""
-    return controller.upper() if controller == agents.SHIPPED or not agents.named(controller) else controller
+    return controller.upper() if re.fullmatch(r"[\w -]*", controller) else formats.line(controller)
 
 
 def summary(results: Sequence[Result]) -> str:
@@ -133,10 +132,19 @@ _DIAGNOSTICS = {
 
 
 def results_csv(results: Sequence[Result]) -> str:
-    """One line a result: the columns of the published data, then what stands beside it."""
+    """One line a result: the columns of the published data, what stands beside it, and what kind of row it is in.
+
+    A row of averages has neither level of uncertainty nor case.
+    """
     numbers = ("published", "measured", "ci_low", "ci_high", "runs", "failures", "median")
-    header = [*(field.name for field in fields(Cell)), *numbers]
-    return as_csv(header, ([*asdict(r.cell).values(), *(exact(getattr(r, name)) for name in numbers)] for r in results))
+
+    def values(result: Result) -> list[object]:
+        cell = result.cell
+        where = replace(cell, uncertainty_percent="", case="") if cell.is_average else cell
+        kind = "average" if cell.is_average else "cell"
+        return [*asdict(where).values(), *(exact(getattr(result, name)) for name in numbers), kind]
+
+    return as_csv([*(field.name for field in fields(Cell)), *numbers, "row"], map(values, results))
 
 
 def runs_csv(outcomes: Sequence[Outcome]) -> str:
@@ -151,15 +159,6 @@ def runs_csv(outcomes: Sequence[Outcome]) -> str:
                 yield [*place, run, int(failed), *(exact(outcome.metrics[name][run]) for name in NAMES)]
 
     return as_csv(header, lines())
-
-
-def as_csv(header: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
-    """A header and lines as CSV."""
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(lines)
-    return file.getvalue()
 
 
 def exact(value: float) -> object:
@@ -212,15 +211,5 @@ def _span(row: Result, text: Callable[[float], str]) -> str:
     return f"[{text(row.ci_low)}, {text(row.ci_high)}]" if math.isfinite(row.ci_low) else ""
 
 
-def _heading(text: str, form: str, level: int = 2) -> str:
-    if form == "github":
-        return f"{'#' * level} {text}"
-    if form.startswith("latex"):
-        return f"\\{'sub' * (level - 2)}section*{{{''.join(LATEX_ESCAPE_RULES.get(c, c) for c in text)}}}"
-    return text if level > 2 else f"{text}\n{'=' * len(text)}"
-
-
 def _table(form: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return tabulate(
-        rows, header, tablefmt=form, disable_numparse=True, colalign=["left"] * 2 + ["right"] * (len(header) - 2)
-    )
+    return formats.table(form, header, rows, ["left"] * 2 + ["right"] * (len(header) - 2))

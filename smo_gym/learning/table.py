@@ -7,9 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from tabulate import tabulate
 
-from ..evaluation.tables import as_csv, exact
+from ..evaluation import formats
+from ..evaluation.formats import as_csv
+from ..evaluation.tables import exact
 from .aggregates import Comparison, Estimate
 from .comparison import Scores
 from .observations import KINDS
@@ -57,7 +58,7 @@ def render(rows: Sequence[Row], levels: Sequence[float], form: str) -> str:
         for row in rows
     ]
     tables = ((["all levels", *kinds], matrix), (header, detail))
-    return "\n\n".join(tabulate(lines, top, tablefmt=form, disable_numparse=True) for top, lines in tables)
+    return "\n\n".join(formats.table(form, top, lines) for top, lines in tables)
 
 
 def _steps(row: Row) -> str:
@@ -106,16 +107,18 @@ def sentence(comparison: Comparison) -> str:
 
 
 def aggregate_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
-    """One line a contender and level."""
-    header = ["controller", "observation", "seeds", "uncertainty", "iqm", "ci_low", "ci_high", "runs", "failures"]
+    """One line a contender and level, and one over all levels, where no level stands."""
+    where = ["controller", "observation", "seeds", "uncertainty"]
+    header = [*where, "iqm", "ci_low", "ci_high", "runs", "failures", "row"]
 
     def lines() -> Iterable[list[object]]:
         for row in rows:
             contender, failed = row.scores.contender, row.scores.failed
             counts = [*(failed[:, k] for k in range(len(levels))), failed]
-            for level, mean, runs in zip([*levels, "all"], row.means, counts, strict=True):
+            of_levels = [(str(level), "level") for level in levels]
+            for (level, kind), mean, runs in zip([*of_levels, ("", "all")], row.means, counts, strict=True):
                 place = [contender.controller, contender.observation, len(contender.cards), level]
-                yield [*place, *map(exact, (mean.value, mean.low, mean.high)), runs.size, int(runs.sum())]
+                yield [*place, *map(exact, (mean.value, mean.low, mean.high)), runs.size, int(runs.sum()), kind]
 
     return as_csv(header, lines())
 

@@ -3,6 +3,8 @@
 const figures = read("figures");
 const [FAINT, OTHER, CHOSEN] = [0, 1, 2];
 const FORCE = ["force_low", "force_high", "force"];
+// All that there are: Plotly's own set has one that uploads the figure.
+const BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]];
 const KINDS = [["truth", "error"], ["truth", "error", ...FORCE], ["truth", "estimate", "reference", "error", ...FORCE]];
 
 function dressed(figure) {
@@ -27,8 +29,7 @@ function tinted(figure) {
 
 function plot(id, figure) {
   const { data: traces, layout } = dressed(structuredClone(figure));
-  const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-  return Plotly.react(id, traces, layout, config);
+  return Plotly.react(id, traces, layout, { responsive: true, displaylogo: false, plotlyServerURL: "", modeBarButtons: BUTTONS });
 }
 
 const translucent = (hex, alpha) =>

@@ -10,7 +10,7 @@ const number = (value, digits = 3) => (value === undefined ? "" : value.toFixed(
 const vector = (values) => `[${values.join(", ")}]`.replaceAll("-", "−");
 const names = {
   table: (group) => `${group.table}: ${group.title}`,
-  controller: (group) => group.controller.toUpperCase(),
+  controller: (group) => group.name,
   uncertainty: (group) => group.uncertainty,
   case: (group) => `${group.case ? `case ${group.case}: ` : ""}${vector(group.start)}`,
   arm: (group) => data.arms[group.arm],

@@ -1,0 +1,205 @@
+"""Settings of a scenario: values with their sources, and what is made of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Generic, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+
+from ..controllers import LQR, SlidingModeController
+from ..observers import Gains, SlidingModeObserver
+from ..plant import CartPendulum
+from ..theorem import OperatingSet, design, stable
+from . import agents
+from .rollout import Agent
+
+T = TypeVar("T")
+Four = tuple[float, float, float, float]
+Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
+State = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
+"""m, rad, m/s, rad/s."""
+Fraction = Annotated[float, Field(ge=0.0, lt=1.0)]
+Name = Annotated[str, Field(max_length=200)]
+Horizon = Annotated[float, Field(le=1e5)]
+"""s; a day and more."""
+LONGEST_PERIOD = 10.0
+"""s; all instants of one control period are in memory at once."""
+Period = Annotated[float, Field(le=LONGEST_PERIOD)]
+
+
+SHORTEST_STEP = 1e-6
+"""s, of an observer."""
+Step = Annotated[float, Field(ge=SHORTEST_STEP)]
+
+
+class Strict(BaseModel):
+    """Unknown names and numbers that are not finite are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Setting(Strict, Generic[T]):
+    """A value and its source."""
+
+    value: T
+    source: Literal["printed", "identified", "chosen"]
+    note: str = ""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, which finds no class ``Setting[float]`` by its name."""
+        return _again, (type(self).__name__, dict(self), self.model_fields_set)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        _KINDS[cls.__name__] = cls
+
+
+_KINDS: dict[str, type[Setting[Any]]] = {}
+
+
+def _again(name: str, values: dict[str, Any], given: set[str]) -> Setting[Any]:
+    return _KINDS.get(name, Setting[Any]).model_construct(given, **values)
+
+
+class ObserverSettings(Strict):
+    """The sliding mode observer that a controller's tables were made with; see there for the units."""
+
+    gains: Setting[str | dict[str, tuple[float, float]]]
+    slopes: Setting[tuple[float, float]]
+    xhat0: Setting[State]
+    time_constant: Setting[float] = Setting[float](value=0.0, source="chosen")
+    step: Setting[Step | None] = Setting[Step | None](value=None, source="chosen")
+
+    def build(self, compensation: bool) -> SlidingModeObserver:
+        """The observer with the compensation on or off."""
+        return SlidingModeObserver(
+            gains=self.gains.value,
+            slopes=self.slopes.value,
+            xhat0=self.xhat0.value,
+            time_constant=self.time_constant.value,
+            step=self.step.value,
+            compensation=compensation,
+        )
+
+
+class LqrSettings(Strict):
+    """u = -K xhat."""
+
+    law: Literal["lqr"]
+    K: Setting[Four]
+    wrap: Setting[bool] = Setting[bool](value=True, source="chosen", note="error of the angle within half a turn")
+    observer: ObserverSettings
+
+    def build(self, dt: float) -> LQR:
+        """The controller."""
+        return LQR(self.K.value, self.wrap.value)
+
+
+class SmcSettings(Strict):
+    """Equations (49)-(50)."""
+
+    law: Literal["smc"]
+    k: Setting[Four]
+    slope: Setting[float]
+    Z0: Setting[float]
+    lam: Setting[float]
+    epsilon: Setting[float]
+    wrap: Setting[bool] = Setting[bool](value=True, source="chosen", note="error of the angle within half a turn")
+    observer: ObserverSettings
+
+    def build(self, dt: float) -> SlidingModeController:
+        """The controller for a control period of ``dt`` seconds."""
+        return SlidingModeController(
+            self.k.value, dt, self.slope.value, self.Z0.value, self.lam.value, self.epsilon.value, self.wrap.value
+        )
+
+
+class PolicySettings(Strict):
+    """An agent by its name for :func:`smo_gym.evaluation.agents.load`: of those names, one that runs no code."""
+
+    law: Literal["policy"]
+    agent: str
+    observer: ObserverSettings
+
+    @field_validator("agent")
+    @classmethod
+    def _data(cls, name: str) -> str:
+        if not agents.is_data(name):
+            raise ValueError(
+                f"a file may name {agents.SHIPPED} or PATH.safetensors alone; what runs code is named on the command "
+                "line, as --controller PATH.zip or module:Class"
+            )
+        return name
+
+    def build(self, environment: str) -> Agent:
+        """The agent for an environment, made anew."""
+        return agents.load(self.agent, environment)
+
+
+ControllerSettings = Annotated[LqrSettings | SmcSettings | PolicySettings, Field(discriminator="law")]
+
+
+class OperatingSetSettings(Strict):
+    """Bounds of states and estimates, and the level of uncertainty."""
+
+    theta: Setting[float]
+    speed: Setting[tuple[float, float]]
+    uncertainty: Setting[Fraction]
+
+
+class DesignSettings(Strict):
+    """An observer whose gains satisfy (28), (30) and (31) over an operating set."""
+
+    operating_set: OperatingSetSettings
+    margin: Setting[float]
+    slopes: Setting[tuple[float, float]]
+    force: Setting[float]
+
+    def over(self, model: CartPendulum) -> OperatingSet:
+        """The operating set; estimated velocities follow an injection of at most m1, and are given a margin more."""
+        one = self.operating_set
+        reach = (1.0 + self.margin.value) ** 2 * math.hypot(*one.speed.value)
+        return OperatingSet(one.theta.value, one.speed.value, (reach, reach), one.uncertainty.value, model)
+
+    def build(self, dt: float, model: CartPendulum) -> SlidingModeObserver:
+        """The observer, with a step that it is stable at for the declared force.
+
+        Raises:
+            ValueError: the step would be too short to compute with.
+        """
+        observer = stable(design(self.over(model), self.margin.value), self.slopes.value, dt, self.force.value)
+        if observer.step is not None and observer.step < SHORTEST_STEP:
+            raise ValueError(
+                f"slopes={self.slopes.value} and force={self.force.value:g} need a step of {observer.step:.3g} s in "
+                f"the observer, less than {SHORTEST_STEP:g} s: take smaller ones"
+            )
+        return observer
+
+
+class TheoremSettings(DesignSettings):
+    """The runs that test a design: ``agents/theorem.py``."""
+
+    starts: Setting[tuple[State, State]]
+    horizon: Setting[Horizon]
+    settle: Setting[float]
+    gains: Setting[dict[str, tuple[float, float]]] | None = None
+
+    @model_validator(mode="after")
+    def _check(self) -> TheoremSettings:
+        low, high = self.starts.value
+        if any(a > b for a, b in zip(low, high, strict=True)):
+            raise ValueError(f"starts: low={low} is above high={high}: the set of initial states holds no point")
+        if not 0.0 <= self.settle.value < self.horizon.value:
+            raise ValueError(f"settle={self.settle.value} must lie between 0 and horizon={self.horizon.value}")
+        if self.gains is not None:
+            Gains.of(self.gains.value)
+        return self
+
+
+class ReferenceSettings(Strict):
+    """The minimum-energy reference of a tracking scenario, from its initial state, over its horizon."""
+
+    end: Setting[State]
+    force_limit: Setting[float]
+    elements: Setting[Annotated[int, Field(ge=1, le=10_000)]]
