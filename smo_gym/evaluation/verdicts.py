@@ -56,7 +56,9 @@ def _cost(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
     effort, force, speed = column("effort"), column("peak_force"), column("estimation_rms_h_dot")
     if not effort[0].size:
         return "no pair of runs stands."
-    means = {name: [float(arm.mean()) for arm in values] for name, values in (("u", effort), ("F", force), ("v", speed))}
+    means = {
+        name: [float(arm.mean()) for arm in values] for name, values in (("u", effort), ("F", force), ("v", speed))
+    }
     return (
         f"without and with compensation, effort {means['u'][0]:.3g} and {means['u'][1]:.3g} N^2 s, mean peak force "
         f"{means['F'][0]:.3g} and {means['F'][1]:.3g} N, RMS error of the estimate of h' {means['v'][0]:.3g} and "
