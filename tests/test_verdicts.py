@@ -10,6 +10,7 @@ import pytest
 
 from smo_gym import CartPendulum, VectorObserverWrapper
 from smo_gym.evaluation import rollout, scenario, study, verdicts
+from smo_gym.evaluation.statistics import place, results
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 
@@ -76,3 +77,21 @@ def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
         print(name, metric, np.abs(b[metric] / a[metric] - 1.0).max(), b[metric].mean() / a[metric].mean() - 1.0)
     assert max(np.abs(b[m] / a[m] - 1.0).max() for m in ("mse_h", "mse_theta")) > least
     assert all(abs(b[m].mean() / a[m].mean() - 1.0) < 0.04 for m in ("mse_h", "mse_theta"))
+
+
+def test_table_7_scatters_more_than_ten_runs_explain():
+    one = scenario.load(CONFIGS / "tracking.yaml")
+    outcomes = study.measure(study.groups([one], ["smc"], ["without", "with"], 200), 0)
+    cells = [r for r in results(outcomes) if r.cell.metric == "mse" and not r.cell.is_average and r.published > 0.0]
+    assert len(cells) == 24
+    assert sum(abs(math.expm1(r.deviation)) <= 0.1 for r in cells) == 4
+    assert sum(r.ceiling for r in cells) == pytest.approx(17.3, abs=0.1)
+    runs_of = {(place(o)[0], o.group.arm): o.metrics for o in outcomes}
+    rng, outside, spread = np.random.default_rng(0), 0, []
+    for r in cells:
+        values = runs_of[r.cell.uncertainty_percent, r.cell.compensation][f"mse_{r.cell.state}"]
+        means = rng.choice(values, (20_000, 10)).mean(axis=1)
+        outside += not means.min() <= r.published <= means.max()
+        spread.append(means.std() / means.mean())
+    assert outside == 5
+    assert (min(spread), max(spread)) == pytest.approx((0.028, 0.188), abs=0.002)
