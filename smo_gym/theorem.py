@@ -75,27 +75,37 @@ def suprema(over: OperatingSet) -> Suprema:
     f2 and g2 are affine in theta'^2 and, one at a time, monotone in M_c, m and l (each is a Moebius function of them),
     so extremes lie at the corners of those; theta is scanned.
     """
-    theta = np.linspace(-over.theta, over.theta, 4001)
-    scales = (1.0 - over.uncertainty, 1.0 + over.uncertainty)
-    plants = [over.model.perturbed(np.array(corner) - 1.0) for corner in itertools.product(scales, repeat=3)]
-
-    def extremes(plants: list[CartPendulum], fastest: float) -> tuple[Array, Array, Array, Array]:
-        drifts, gains = [], []
-        for plant in plants:
-            for omega in (0.0, fastest):
-                x = np.array([np.zeros_like(theta), theta, np.zeros_like(theta), np.full_like(theta, omega)])
-                drifts.append(plant.drift(x)[2:])
-                gains.append(plant.gain(x)[2:])
-        f, g = np.concatenate(drifts, axis=1), np.concatenate(gains, axis=1)
-        return f.min(axis=1), f.max(axis=1), g.min(axis=1), g.max(axis=1)
-
-    f_low, f_high, g_low, g_high = extremes(plants, over.speed[1])
-    fhat_low, fhat_high, ghat_low, ghat_high = extremes([over.model], over.speed_hat[1])
+    f, g = _corners(over.theta, over.speed[1], _plants(over))
+    fhat, ghat = _corners(over.theta, over.speed_hat[1], [over.model])
     return Suprema(
         speed=np.array(over.speed),
-        drift=np.maximum(f_high - fhat_low, fhat_high - f_low),
-        gain=np.maximum(g_high - ghat_low, ghat_high - g_low),
+        drift=np.maximum(f.max(axis=1) - fhat.min(axis=1), fhat.max(axis=1) - f.min(axis=1)),
+        gain=np.maximum(g.max(axis=1) - ghat.min(axis=1), ghat.max(axis=1) - g.min(axis=1)),
     )
+
+
+def acceleration(over: OperatingSet, force: float) -> Array:
+    """The supremum of |X2'| = |f2(x) + g2(x) u| over an operating set while |u| <= force, one entry a row."""
+    f, g = _corners(over.theta, over.speed[1], _plants(over))
+    return np.asarray((np.abs(f) + np.abs(g) * force).max(axis=1))
+
+
+def _plants(over: OperatingSet) -> list[CartPendulum]:
+    """The plants whose parameters are all as far off as the level allows."""
+    scales = (1.0 - over.uncertainty, 1.0 + over.uncertainty)
+    return [over.model.perturbed(np.array(corner) - 1.0) for corner in itertools.product(scales, repeat=3)]
+
+
+def _corners(widest: float, fastest: float, plants: list[CartPendulum]) -> tuple[Array, Array]:
+    """f2 and g2, (2, m) each, of some plants where theta' is 0 or ``fastest``, over |theta| <= ``widest``."""
+    theta = np.linspace(-widest, widest, 4001)
+    drifts, gains = [], []
+    for plant in plants:
+        for omega in (0.0, fastest):
+            x = np.array([np.zeros_like(theta), theta, np.zeros_like(theta), np.full_like(theta, omega)])
+            drifts.append(plant.drift(x)[2:])
+            gains.append(plant.gain(x)[2:])
+    return np.concatenate(drifts, axis=1), np.concatenate(gains, axis=1)
 
 
 def initial_errors(starts: ArrayLike, xhat0: ArrayLike) -> tuple[Array, Array]:
@@ -178,6 +188,40 @@ def layer(speed: ArrayLike, m1: ArrayLike, slope: float) -> Array:
     ratio = np.minimum(np.abs(np.asarray(speed)) / np.asarray(m1), 1.0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.arctanh(ratio) / slope)
+
+
+def position_bound(speed: ArrayLike, m1: ArrayLike, slope: float, kappa: ArrayLike) -> Array:
+    """What holds with tanh: |e(t)| <= atanh((V + kappa) / m1) / k_p from t = |e(0)| / kappa on, 0 < kappa < m1 - V.
+
+    Outside of it m1 tanh(k_p |e|) > V + kappa, so that |e| falls faster than kappa; inside, it cannot come out.
+
+    Args:
+        speed: V, a bound of |X2|.
+        m1: gain of (34).
+        slope: k_p, of the tanh in it.
+        kappa: how fast the error is to fall; the larger, the sooner and the wider.
+    """
+    return layer(np.abs(np.asarray(speed)) + np.asarray(kappa), m1, slope)
+
+
+def velocity_bound(observer: SlidingModeObserver, over: OperatingSet, force: float) -> Array:
+    """What |X2 - X2hat| comes below in the end, row by row: A / a + atanh(rho) / k_v.
+
+    With d = X2 - psi2 and psi2 = m1 tanh(k_p e), d' = X2' - k_p (m1 - psi2^2 / m1) d. Where |e| has come into its
+    layer, |psi2| <= V, the rate is at least a = k_p (m1 - V^2 / m1), and d comes below A / a with A = sup |X2'|. And
+    while |psi2 - X2hat| > atanh(rho) / k_v, with rho the larger of sup f-error / beta_1 and sup g-error / beta_2, the
+    injection of (35) exceeds what it has to overcome. The straight line between two samples adds some A dt.
+
+    Infinite where a gain does not exceed its supremum.
+    """
+    gains, bounds = Gains.of(observer.gains), suprema(over)
+    slope_p, slope_v = observer.slopes
+    m1, speed = np.array(gains.m1), bounds.speed
+    rate = slope_p * (m1 - speed**2 / m1)
+    with np.errstate(divide="ignore"):
+        rho = np.maximum(bounds.drift / np.array(gains.beta_1), bounds.gain / np.array(gains.beta_2))
+        tracking = np.where(speed < m1, acceleration(over, force) / np.where(speed < m1, rate, 1.0), np.inf)
+    return np.asarray(tracking + layer(rho, 1.0, slope_v))
 
 
 def reaching_time(error: ArrayLike, gain: ArrayLike, supremum: ArrayLike) -> Array:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from smo_gym import LQR, CartPendulum, Gains, SlidingModeController, theorem
+from smo_gym import LQR, CartPendulum, Gains, SlidingModeController, SlidingModeObserver, theorem
 from smo_gym.evaluation.convergence import converge
 from smo_gym.theorem import OperatingSet
 
@@ -114,6 +114,44 @@ def test_errors_are_in_their_layers_when_the_theorem_says_so():
     assert not failing.kept.all()
 
 
+def test_what_holds_with_tanh_holds_on_random_runs():
+    rng = np.random.default_rng(1)
+    n, force = 100, 60.0
+    starts = rng.uniform([-0.5, -0.5, -0.1, -0.1], [0.5, 0.5, 0.1, 0.1], (n, 4))
+    plants = np.array([CartPendulum().draw(0.2, rng).as_array() for _ in range(n)])
+    observer = theorem.stable(theorem.design(SET), (200.0, 100.0), 0.001, force)
+    agent = LQR([7.197, -4.026, 10.96, -0.9999])
+    found = converge({"designed": observer}, agent, SET, starts, plants, force=force, horizon=3.0, settle=1.0)
+    assert found.stayed.all()
+    assert found.bounded.all()
+    assert (found.velocity_settled < found.velocity_bound[:, None]).all()
+    rows = np.array([[1.0, 1.0], [0.0, 0.0]])
+    assert np.isinf(theorem.velocity_bound(SlidingModeObserver(gains="lqr"), SET, force)).any()
+    assert theorem.position_bound(rows, 2.0, 10.0, 0.5)[1, 0] == pytest.approx(math.atanh(0.25) / 10.0)
+
+
+def test_at_constant_speed_the_layer_is_reached_in_the_end_only_and_the_bound_in_time():
+    """e' = V - m1 tanh(k e), worked out by Euler's method: (43) is not what tanh promises."""
+    V, m1, k, dt = 1.7, 6.02, 200.0, 1e-6
+    kappa = 0.5 * (m1 - V)
+    e0 = 0.5
+    t0, layer = e0 / (m1 - V), float(theorem.layer(V, m1, k))
+    errors = [e0]
+    for _ in range(round(e0 / kappa / dt)):
+        errors.append(errors[-1] + dt * (V - m1 * math.tanh(k * errors[-1])))
+    assert errors[round(t0 / dt)] > 1.5 * layer
+    assert errors[-1] <= float(theorem.position_bound(V, m1, k, kappa))
+
+
+def test_no_random_acceleration_exceeds_its_bound():
+    rng = np.random.default_rng(2)
+    bound = theorem.acceleration(SET, 60.0)
+    x = rng.uniform(-1, 1, (4, 20_000)) * np.array([[1.0], [0.7], [1.7], [5.2]])
+    for corner in rng.choice([-0.2, 0.2], (30, 3)):
+        plant = CartPendulum().perturbed(corner)
+        assert (np.abs(plant.drift(x) + plant.gain(x) * 60.0)[2:].max(axis=1) <= bound).all()
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -137,6 +175,9 @@ def test_the_command(tmp_path):
     command = [sys.executable, str(ROOT / "agents" / "theorem.py"), "--runs", "30"]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     assert "30 of 30 were inside the layer of both positions by the time of (43)" in text
+    assert "30 of 30 kept |e| <= atanh((V + kappa) / m1) / k_p from |e(0)| / kappa on, kappa = 0.5" in text
+    assert "In the end |X2 - X2hat| is at most (0.0215, 0.239) m/s, rad/s" in text
+    assert "designed gains, printed runs' slopes" in text
     assert "(51): least |ds/dx g|" in text
     assert "LQR, case 4" in text  # conditions along runs
     changes = (

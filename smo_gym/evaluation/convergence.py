@@ -12,10 +12,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from ..observers import Period, SlidingModeObserver
-from ..theorem import OperatingSet, layer, reaching_time, suprema
+from ..theorem import OperatingSet, layer, position_bound, reaching_time, suprema, velocity_bound
 from .rollout import Agent
 
 Array = NDArray[np.float64]
+SHARES = np.array([0.1, 0.5, 0.9])
+"""The kappa of the bound that holds with tanh, as shares of m1 - V."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,12 @@ class Convergence:
     """t1 of (48) in s, (2, n)."""
     velocity_error: Array
     """Largest |velocity error| after t1, (2, n)."""
+    bounded: NDArray[np.bool_]
+    """Whether each position error kept :func:`smo_gym.theorem.position_bound`, for each of SHARES, (3, 2, n)."""
+    velocity_bound: Array
+    """What the velocity errors come below in the end, :func:`smo_gym.theorem.velocity_bound`, (2,)."""
+    velocity_settled: Array
+    """Largest |velocity error| after the settling time, (2, n)."""
     velocity_rms: dict[str, Array]
     """RMS errors of h' and theta' over all runs that stayed, after the settling time, observer by observer, (2,)."""
     largest: Array
@@ -105,6 +113,10 @@ def converge(
     half = layer(bounds.speed, gains.m1, observers[first].slopes[0])[:, None]
     x = info["state"].T
     promised = reaching_time(x[:2] - watched.xhat[:2], np.array(gains.m1)[:, None], bounds.speed[:, None])
+    kappa = SHARES[:, None] * (np.array(gains.m1) - bounds.speed)
+    bound = position_bound(bounds.speed, gains.m1, observers[first].slopes[0], kappa)[:, :, None]
+    bound_from = np.abs(x[:2] - watched.xhat[:2]) / kappa[:, :, None]
+    bounded, settled = np.ones((len(SHARES), 2, n), dtype=np.bool_), np.zeros((2, n))
     promised_velocity = np.full((2, n), np.nan)
     stayed = over.holds(x, watched.xhat)
     reached, velocity_error = np.zeros((2, n)), np.full((2, n), np.nan)
@@ -123,6 +135,7 @@ def converge(
         stayed &= over.holds(x, xhat) & (np.abs(u) <= force)
         largest = np.maximum(largest, np.abs(np.concatenate([x[1:], xhat[1:], u[None]])).max(axis=1))
         reached = np.where(np.abs(x[:2] - xhat[:2]) > half, time, reached)
+        bounded &= (time < bound_from) | (np.abs(x[:2] - xhat[:2]) <= bound)
         error = np.abs(x[2:] - xhat[2:])
         at_t0 = np.isnan(promised_velocity) & (time >= promised)
         t1 = promised + reaching_time(error, np.array(gains.beta_1)[:, None], bounds.drift[:, None])
@@ -130,6 +143,7 @@ def converge(
         velocity_error = np.where(time >= promised_velocity, np.fmax(velocity_error, error), velocity_error)
         if time >= settle:
             count += 1
+            settled = np.maximum(settled, error)
             for name, estimator in estimators.items():
                 squares[name] += (x[2:] - estimator.xhat[2:]) ** 2
         if k % 100 == 0:
@@ -141,6 +155,9 @@ def converge(
         reached=reached,
         promised_velocity=promised_velocity,
         velocity_error=velocity_error,
+        bounded=bounded,
+        velocity_bound=velocity_bound(observers[first], over, force),
+        velocity_settled=settled,
         velocity_rms={name: np.sqrt(total[:, stayed].mean(axis=1) / count) for name, total in squares.items()},
         largest=largest,
         horizon=horizon,

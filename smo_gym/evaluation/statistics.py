@@ -12,10 +12,9 @@ from scipy import stats
 
 from ..article import Cell, published
 from .study import ARMS, Outcome
+from .verdicts import PRINTED_RUNS, ceiling
 
 Array = NDArray[np.float64]
-# A cell of the article is a mean of so many runs.
-_PRINTED_RUNS = 10
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +31,8 @@ class Result:
     failures: int
     half_width: float = math.nan
     """Of the 95 % prediction interval around ``measured`` for a mean of ten further runs, which a printed cell is."""
+    ceiling: float = math.nan
+    """How probably such a mean lies within 10 % of ``measured``."""
 
     @property
     def deviation(self) -> float:
@@ -103,6 +104,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
         runs=len(values),
         failures=int(np.count_nonzero(~complete)),
         half_width=_prediction(values[complete]),
+        ceiling=ceiling(values[complete]),
     )
     if not any(known.table == cell.table and known.metric == "rms" for known in published()):
         return [mse]
@@ -116,6 +118,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
         ci_high=math.sqrt(mse.ci_high),
         median=math.sqrt(mse.median),
         half_width=math.nan,
+        ceiling=math.nan,
     )
     return [mse, rms]
 
@@ -170,7 +173,7 @@ def _prediction(values: Array) -> float:
     n = values.size
     if n < 2:
         return math.nan
-    return float(stats.t.ppf(0.975, n - 1) * values.std(ddof=1) * math.sqrt(1.0 / n + 1.0 / _PRINTED_RUNS))
+    return float(stats.t.ppf(0.975, n - 1) * values.std(ddof=1) * math.sqrt(1.0 / n + 1.0 / PRINTED_RUNS))
 
 
 def _interval(values: Array) -> tuple[float, float]:

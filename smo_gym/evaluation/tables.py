@@ -10,7 +10,7 @@ from dataclasses import asdict, fields, replace
 import numpy as np
 
 from ..article import Cell
-from . import formats
+from . import formats, verdicts
 from .formats import as_csv
 from .metrics import NAMES
 from .statistics import Result
@@ -60,10 +60,12 @@ def verdict(rows: Sequence[Result]) -> str:
     if not off.size:
         return f"No published cell to compare with. {failed}"
     furthest = off[np.argmax(np.abs(off))]
+    most = sum(row.ceiling for row in mse if not row.cell.is_average and math.isfinite(row.deviation))
     return (
         f"{off.size} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(off**2)):.1f} %, "
-        f"{np.count_nonzero(np.abs(np.expm1(off)) <= 0.1)} within 10 %, "
-        f"furthest off {100 * np.expm1(furthest):+.1f} %. "
+        f"{np.count_nonzero(np.abs(np.expm1(off)) <= 0.1)} within 10 %"
+        + (f" (means of ten runs would come to {most:.1f} with every setting exact), " if math.isfinite(most) else ", ")
+        + f"furthest off {100 * np.expm1(furthest):+.1f} %. "
         + (f"Averages off {', '.join(f'{100 * np.expm1(a):+.1f} %' for a in averages)}. " if averages else "")
         + failed
     )
@@ -84,13 +86,14 @@ def summary(results: Sequence[Result]) -> str:
     foreseen = sum(abs(r.published - r.measured) <= r.half_width for r in cells)
     return (
         f"{len(cells)} published MSE cells in all: {near} within 10 %, {inside} within the 95 % interval of our mean, "
-        f"{foreseen} within that of another mean of ten runs."
+        f"{foreseen} within that of another mean of ten runs, where 95 % would be {0.95 * len(cells):.0f}."
     )
 
 
 def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
-    """What else the runs showed, as a table."""
-    return _table(form, *diagnosed(outcomes))
+    """What else the runs showed: a table, and what the compensation costs."""
+    lines = (formats.escaped(line, form) for line in verdicts.costs(outcomes))
+    return "\n\n".join([_table(form, *diagnosed(outcomes)), *lines])
 
 
 def diagnosed(outcomes: Sequence[Outcome]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
