@@ -138,7 +138,7 @@ def test_a_full_disk_is_one_line_and_the_tables_are_shown(short, tmp_path, monke
 
 def test_what_cannot_be_replaced_is_said_before_the_runs(tmp_path, capsys):
     (tmp_path / "settings.yaml").mkdir()
-    assert load("evaluate").main(["--runs", "1e6", "--out", str(tmp_path)]) == 2
+    assert load("evaluate").main(["--runs", "1e4", "--out", str(tmp_path)]) == 2
     assert f"{tmp_path / 'settings.yaml'} is a folder" in capsys.readouterr().err
     assert load("animate").main(["--out", str(tmp_path / "settings.yaml")]) == 2
     (tmp_path / "x.gif").mkdir()
@@ -292,7 +292,7 @@ def test_messages_show_a_way_out(short, tmp_path, capsys):
     own.write_text(own.read_text().replace(str(ROOT / "configs" / "initial-conditions.yaml"), "article.yaml"))
     assert evaluate.main(short) == 2
     message = capsys.readouterr().err
-    assert f"{own}: extends article.yaml, which is not beside it: copy that file too, or give the whole path" in message
+    assert f"{own}: extends='article.yaml' is no file: it must be named as it is found from {tmp_path}/" in message
 
 
 def test_where_nothing_is_published_nothing_is_counted(short, capsys):

@@ -201,7 +201,7 @@ def test_no_other_policy_is_opened_than_those_that_run(here):
     assert set(runs("--controller", "lqr", config=config)) == {"lqr"}
     for controller in ("mine", "policy", "all"):
         assert evaluate.main(["--config", config, "--controller", controller]) == 2
-    with pytest.raises(ValueError, match=r"own\.yaml: none\.json: cannot be read"):
+    with pytest.raises(ValueError, match=r"own\.yaml: none\.safetensors: cannot be read"):
         scenario.load(Path(config))
 
 
@@ -240,7 +240,7 @@ def test_training_and_tables_have_the_same_observer():
         ("twins:Late", "twins:Late: cannot act at t = 0.003 s (ZeroDivisionError: division by zero); nothing was"),
         ("leaves:Twin", "leaves:Twin: cannot import 'leaves' (SystemExit: 3)"),
         ("twins:Lost", "must be finite; nothing was written"),
-        ("none.safetensors", "none.json: cannot be read"),
+        ("none.safetensors", "none.safetensors: cannot be read"),
         ("cut.safetensors", "cut.safetensors: is corrupt"),
         ("upright.safetensors", "was trained for SMOPendulumUpright-v0, not for SMOPendulum-v0"),
         ("wide.safetensors", "weights have shapes [(1, 6)], the card asks for [(2, 6)]"),
