@@ -134,9 +134,10 @@ def resume(path: Path, plan: dict[str, Any]) -> list[Costs]:
     """The costs of an interrupted run, search by search; none where there was no such run.
 
     Raises:
-        ValueError: it ran with other options, or the file is damaged.
+        ValueError: it ran with other options, or the file is damaged or of an older version.
     """
     if not path.exists():
+        files.refuse_pickle(path.with_name("state.pkl"))
         return []
     try:
         state = json.loads(path.read_text(encoding="utf-8"))

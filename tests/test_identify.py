@@ -120,3 +120,15 @@ def test_bad_arguments_are_named(tmp_path):
     done = subprocess.run(identify(tmp_path, "--generations", "0"), capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert "--generations: '0' must be a whole number of at least 1" in done.stderr
+
+
+def test_a_state_that_only_unpickling_could_read_is_refused(tmp_path):
+    (tmp_path / "state.pkl").write_bytes(b"cos\nsystem\n(S'exit 3'\ntR.")
+    command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--out", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "state.pkl: is of an older version and is not opened" in done.stderr
+    (tmp_path / "state.pkl").unlink()
+    (tmp_path / "state.json").write_text('{"plan": 1')
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, "state.json is damaged" in done.stderr) == (2, True)

@@ -126,6 +126,9 @@ def test_no_file_that_lies_there_runs_code(command, tmp_path, capsys):
         assert command("--steps", "32") == 2
         assert len(capsys.readouterr().err.splitlines()) == 1
         (tmp_path / "run" / name).write_bytes(kept)
+    (tmp_path / "run" / "checkpoint.pt").unlink()
+    assert command("--steps", "32") == 2
+    assert "checkpoint.zip: is of an older version and is not opened" in capsys.readouterr().err
     assert not (tmp_path / "ran").exists()
 
 

@@ -44,6 +44,16 @@ def read_yaml(path: Path) -> Any:
         raise ValueError(f"{path}: is not YAML ({shortened(str(error))})") from None
 
 
+def refuse_pickle(path: Path) -> None:
+    """See that no state of an older version lies there, which only unpickling could read.
+
+    Raises:
+        ValueError: it does.
+    """
+    if path.exists():
+        raise ValueError(f"{path}: is of an older version and is not opened, for that could run any code: remove it")
+
+
 def shortened(text: str, most: int = 400) -> str:
     """A message as one line that can be read."""
     line = " ".join(text.split())

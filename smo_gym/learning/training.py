@@ -174,6 +174,8 @@ def train(
     env = VecMonitor(SB3VecEnv(make(run, run.n_envs, AutoresetMode.SAME_STEP)))
     log = str(folder / "tensorboard") if tensorboard else None
     begun = checkpoint.exists()
+    if not begun:
+        files.refuse_pickle(folder / "checkpoint.zip")
     model = learner(run, env, log)
     frozen(model, run)  # what cannot be frozen is noticed now, not at the first checkpoint
     agree(folder / "run.json", asdict(run), begun)
