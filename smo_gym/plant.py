@@ -50,11 +50,14 @@ class CartPendulum:
 
     @classmethod
     def of(
-        cls, params: CartPendulum | Mapping[str, float] | ArrayLike | None, base: CartPendulum | None = None
+        cls,
+        params: CartPendulum | Mapping[str, float] | ArrayLike | None,
+        base: CartPendulum | None = None,
+        name: str = "params",
     ) -> CartPendulum:
         """A plant from a plant, a mapping of field names, an array [M_c, m, l, g] or None.
 
-        What a mapping or None leaves out is taken from ``base`` (Table 2 by default).
+        What a mapping or None leaves out is taken from ``base`` (Table 2 by default). Messages call it by ``name``.
 
         Raises:
             ValueError: an unknown field, a wrong shape or a value that is not allowed.
@@ -66,7 +69,7 @@ class CartPendulum:
             return params
         if isinstance(params, Mapping):
             return replace(base, **mapping("plant parameter", params, [f.name for f in fields(cls)]))
-        return cls(*array("params", params, (4,)).tolist())
+        return cls(*array(name, params, (4,)).tolist())
 
     def as_array(self) -> Array:
         """[M_c, m, l, g], shape (4,)."""

@@ -144,12 +144,13 @@ def minimum_energy(
     start, end = array("x0", x0, (4,)), array("xT", xT, (4,))
     T = number("horizon", horizon, above=0.0)
     bound = number("force_limit", force_limit, above=0.0)
+    plant = CartPendulum.of(model, name="model")
     elements, refine = whole("elements", elements, 1), whole("refine", refine, 1)
     try:
         import casadi
     except ImportError:
         raise ImportError('minimum_energy needs CasADi: pip install "smo_gym[reference]"') from None
-    parameters: list[float] = (model or CartPendulum()).as_array().tolist()
+    parameters: list[float] = plant.as_array().tolist()
 
     mechanical_energy: Any = plain(energy)  # of symbols here
 

@@ -1,5 +1,6 @@
 """What the feedback laws share: where an observation holds the estimate, and the checks of weights."""
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -52,10 +53,9 @@ def nominal(model: Any) -> CartPendulum:
     task = getattr(getattr(model, "unwrapped", None), "task", None)
     if isinstance(task, Task):
         return task.params
-    try:
-        return CartPendulum.of(model)
-    except ValueError as error:
-        raise ValueError(f"model={short(model)} must be a CartPendulum or a smo_gym environment ({error})") from None
+    if isinstance(model, str) or not isinstance(model, CartPendulum | Mapping | Sequence | np.ndarray | None):
+        raise ValueError(f"model={short(model)} must be a CartPendulum or a smo_gym environment")
+    return CartPendulum.of(model, name="model")
 
 
 def weights(Q: ArrayLike, R: ArrayLike) -> tuple[Array, float]:

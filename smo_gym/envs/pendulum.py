@@ -154,10 +154,13 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         """Hold the force over one control period."""
         if self._steps_left == 0:
             raise ResetNeeded("the episode has not begun or is over: call reset() before step()")
-        action = np.asarray(action)
-        if action.shape != (1,):
-            raise ValueError(f"action={short(action)} has shape {action.shape}, it must have shape (1,)")
-        u = applied_force(action[None], 1, self.task.force_limit)
+        try:
+            wanted = np.asarray(action, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f"action={short(action)} must be an array of numbers of shape (1,)") from None
+        if wanted.shape != (1,):
+            raise ValueError(f"action={short(action)} has shape {wanted.shape}, it must have shape (1,)")
+        u = applied_force(wanted[None], 1, self.task.force_limit)
         self._steps_left -= 1
         k = self._stepper.steps - self._steps_left
         x_d = _REST if self._desired is None else self._desired.states[k : k + 1]

@@ -205,8 +205,8 @@ def plain_data(value: Any) -> Any:
     return value.value if isinstance(value, Enum) else value
 
 
-def applied_force(action: ArrayLike, n: int, bound: float) -> Array:
-    """The force in N that the actuator applies, (n,): the actions (n, 1) clipped to its limit.
+def applied_force(action: ArrayLike, n: int, bound: float, ignored: Flags | None = None) -> Array:
+    """The force in N that the actuator applies, (n,): the actions (n, 1) clipped to its limit, 0 where ignored.
 
     Raises:
         ValueError: the shape is not (n, 1), or an action is not finite.
@@ -217,6 +217,8 @@ def applied_force(action: ArrayLike, n: int, bound: float) -> Array:
         raise ValueError(f"action={short(action)} must be an array of numbers of shape {(n, 1)}") from None
     if wanted.shape != (n, 1):
         raise ValueError(f"action has shape {wanted.shape}, it must have shape {(n, 1)}")
+    if ignored is not None:
+        wanted[ignored] = 0.0
     u = np.empty(n)
     slot = _saturate(wanted, bound, u)
     if slot >= 0:

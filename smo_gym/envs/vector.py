@@ -133,9 +133,7 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
         waiting = np.count_nonzero(over) > 0
         if waiting:
             held = self._x[:, over]
-            if np.shape(actions) == (self.num_envs, 1):  # else the check of the action says so
-                actions = np.where(over[:, None], 0.0, actions)
-        u = applied_force(actions, self.num_envs, self.task.force_limit)
+        u = applied_force(actions, self.num_envs, self.task.force_limit, over if waiting else None)
         self._k[~over] += 1
         x_d = self._rest if self._desired is None else self._desired.states[self._k]
         samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)

@@ -114,7 +114,7 @@ class SlidingModeObserver:
     def __post_init__(self) -> None:
         object.__setattr__(self, "gains", Gains.of(self.gains))
         if self.model is not None:
-            object.__setattr__(self, "model", CartPendulum.of(self.model))
+            object.__setattr__(self, "model", CartPendulum.of(self.model, name="model"))
         object.__setattr__(self, "xhat0", tuple(array("xhat0", self.xhat0, (4,)).tolist()))
         if not isinstance(self.compensation, bool):
             raise ValueError(f"compensation={self.compensation!r} must be True or False")
