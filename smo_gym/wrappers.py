@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any, cast
@@ -109,14 +110,9 @@ def task_of(env: Any, batch: bool | None = None) -> Task:
     return task
 
 
-def _measured(observation: Array, y: Array) -> None:
-    """See that what is observed is what the encoders measured, (..., 2) each.
-
-    Raises:
-        ValueError: something between the environment and the observer has changed it.
-    """
-    if np.count_nonzero(observation != y):
-        raise ValueError(f"the environment observes {short(observation)} where {short(y)} was measured: {UNSEEN}")
+def _unseen(observation: Array, y: Array) -> ValueError:
+    """What there is to say where the observation is not what the encoders measured."""
+    return ValueError(f"the environment observes {short(observation)} where {short(y)} was measured: {UNSEEN}")
 
 
 def _lost(xhat: Array) -> Flags | None:
@@ -194,7 +190,7 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
         samples, force, state = info["samples"], info["force"], info["state"]
         self._estimator.update(Period(self._y, samples[:, :, None], np.array([force]), state[:, None]))
         xhat = self._estimator.xhat
-        lost = _lost(xhat) is not None
+        lost = not all(map(math.isfinite, xhat[:, 0].tolist()))
         if lost:
             self._estimator.reset(self._every, state[:, None])
             xhat = self._estimator.xhat
@@ -202,7 +198,8 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
 
     def _append(self, observation: Array, info: dict[str, Any], xhat: Array, lost: bool) -> Array:
         y = info["samples"][-1]
-        _measured(observation[:2], y)
+        if observation[0] != y[0] or observation[1] != y[1]:
+            raise _unseen(observation[:2], y)
         self._y = y[:, None].copy()
         info["estimate_failed"] = lost
         self._show(xhat)
@@ -295,7 +292,8 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
 
     def _append(self, observation: Array, info: dict[str, Any], failed: Flags) -> Array:
         y, xhat = info["samples"][:, -1], self._estimator.xhat
-        _measured(observation[:, :2], y)
+        if np.count_nonzero(observation[:, :2] != y):
+            raise _unseen(observation[:, :2], y)
         self._y = y.T.copy()
         info["estimate_failed"], info["_estimate_failed"] = failed, self._every
         self._show(xhat)
