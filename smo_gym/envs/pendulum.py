@@ -7,14 +7,13 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 from gymnasium import logger
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
 from ..validation import mapping, short
 from .desired import Desired
 from .rendering import MODES, Renderer, Scene
-from .spec import told
+from .spec import Specified
 from .task import HANGING, TRACKING, UPRIGHT, Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
@@ -22,7 +21,7 @@ RESET_OPTIONS = ("state", "params")
 _REST = np.zeros((1, 4))
 
 
-class PendulumEnv(gymnasium.Env[Array, Array]):
+class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
     """A cart pendulum whose parameters are uncertain and of which only the positions are measured.
 
     ## Description
@@ -112,7 +111,6 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
 
     metadata: ClassVar[dict[str, Any]] = {"render_modes": MODES, "render_fps": 50}  # type: ignore[misc]
     defaults: ClassVar[Task] = HANGING
-    _spec: EnvSpec | None = None
 
     def __init__(self, render_mode: str | None = None, **options: Any) -> None:
         if render_mode is not None and render_mode not in MODES:
@@ -129,15 +127,6 @@ class PendulumEnv(gymnasium.Env[Array, Array]):
         self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
         self._scene: Scene | None = None
         self._ghost: Array | None = None
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """What :func:`gymnasium.make` was asked for, with the episode's length; all of it fits into JSON."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = told(spec, self.task)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
         """Draw a plant and an initial state, or take them from ``options``."""

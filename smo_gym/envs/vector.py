@@ -9,7 +9,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 from gymnasium import logger
-from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -20,14 +19,14 @@ from ..validation import mapping, short, whole
 from .desired import Desired
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .rendering import Renderer, Scene
-from .spec import told
+from .spec import Specified
 from .task import Stepper, Task, applied_force
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
-class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
+class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
     """``num_envs`` pendulums in one batch.
 
     Slot i seeded with s gives, bit for bit, what the scalar environment seeded with s + i gives, whatever the number
@@ -49,7 +48,6 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
     """
 
     scalar: ClassVar[type[PendulumEnv]] = PendulumEnv
-    _spec: EnvSpec | None = None
 
     def __init__(
         self,
@@ -172,15 +170,6 @@ class PendulumVectorEnv(VectorEnv[Array, Array, Array]):
             "final_info": final_info,
             "_final_info": ended.copy(),
         }
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """What :func:`gymnasium.make_vec` was asked for, with the episodes' length; all of it fits into JSON."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = told(spec, self.task)
 
     def render(self) -> tuple[Any, ...] | None:
         """One frame (height, width, 3) a slot, as Gymnasium's vector environments give them; None without a mode."""
