@@ -91,6 +91,14 @@ def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.flo
     return result
 
 
+def shape_of(value: Any) -> tuple[int, ...] | None:
+    """The shape of what may be an array; None for rows of different lengths."""
+    try:
+        return tuple(np.shape(value))
+    except ValueError:
+        return None
+
+
 def multiple(name: str, value: Any, of_name: str, of: float) -> int:
     """How many times ``of`` goes into ``value``: a whole number from 1 to :data:`MOST`.
 

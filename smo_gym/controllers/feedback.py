@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..envs.task import Task
 from ..plant import CartPendulum
-from ..validation import array, number, short
+from ..validation import array, number, shape_of, short
 
 Array = NDArray[np.float64]
 
@@ -65,16 +65,13 @@ def weights(Q: ArrayLike, R: ArrayLike) -> tuple[Array, float]:
         ValueError: Q is not symmetric positive semidefinite of shape (4,) or (4, 4), or R, a number or (1, 1), is not
             positive.
     """
-    matrix = array("Q", Q, np.shape(Q))
-    matrix = np.diag(matrix) if matrix.shape == (4,) else matrix
-    if (
-        matrix.shape != (4, 4)
-        or not np.allclose(matrix, matrix.T)
-        or np.linalg.eigvalsh(matrix).min() < -1e-12 * max(1.0, np.abs(matrix).max())
-    ):
+    shape = shape_of(Q)
+    matrix = array("Q", Q, (4, 4) if shape == (4, 4) else (4,))
+    matrix = np.diag(matrix) if matrix.ndim == 1 else matrix
+    if not np.allclose(matrix, matrix.T) or np.linalg.eigvalsh(matrix).min() < -1e-12 * max(1.0, np.abs(matrix).max()):
         raise ValueError(
             f"Q={short(Q)} must be symmetric positive semidefinite, given as its diagonal (4,) or as (4, 4)"
         )
-    if np.shape(R) not in ((), (1,), (1, 1)):
+    if shape_of(R) not in ((), (1,), (1, 1)):
         raise ValueError(f"R={short(R)} must be a positive number, or that as an array of shape (1, 1)")
     return matrix, number("R", np.asarray(R).item() if np.ndim(R) else R, above=0.0)

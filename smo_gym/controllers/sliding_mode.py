@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..article import SMC_GAINS
 from ..kernels import kernel
 from ..kernels.elementary import sincos, tanh
-from ..validation import array, number
+from ..validation import array, number, shape_of, short
 from .feedback import estimated_error
 
 Array = NDArray[np.float64]
@@ -49,15 +49,18 @@ class SlidingModeController:
         epsilon: float = SMC_GAINS["epsilon"],
         wrap: bool = True,
     ) -> None:
-        shape = np.shape(k)
-        if shape[-1:] != (4,) or len(shape) > 2:
+        shape = shape_of(k)
+        if shape is None or shape[-1:] != (4,) or len(shape) > 2:
             raise ValueError(f"k has shape {shape}, it must have shape (4,) or (n, 4)")
         self.k = array("k", k, shape)
         if (self.k <= 0.0).any():
             raise ValueError(f"k={self.k.tolist()} must be positive")
-        self.slope = np.array(slope, dtype=np.float64)
+        try:
+            self.slope = np.array(slope, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            self.slope = np.array(np.nan)
         if self.slope.shape not in ((), shape[:-1]) or not (self.slope > 0.0).all():
-            raise ValueError(f"slope={slope!r} must be positive, one number or one a slot")
+            raise ValueError(f"slope={short(slope)} must be positive, one number or one a slot")
         self.dt = number("dt", dt, above=0.0)
         self.Z0 = number("Z0", Z0, above=0.0)
         self.lam = number("lam", lam, above=0.0)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..kernels import kernel
 from ..plant import CartPendulum, advance
 from ..reference import Reference, shipped
-from ..validation import array, limit, mapping, multiple, number, short, unknown, whole
+from ..validation import array, limit, mapping, multiple, number, shape_of, short, unknown, whole
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -113,10 +113,7 @@ class Task:
         set_(self, "initial_state", (tuple(low.tolist()), tuple(high.tolist())))
 
     def _box(self) -> tuple[Array, Array]:
-        try:
-            shape = np.shape(self.initial_state)
-        except ValueError:
-            shape = None
+        shape = shape_of(self.initial_state)
         if shape == (4,):
             low = high = array("initial_state", self.initial_state, (4,))
         elif shape == (2, 4):

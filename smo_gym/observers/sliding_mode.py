@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -18,7 +19,7 @@ from ..kernels.cart_pendulum import drift_and_gain
 from ..kernels.elementary import tanh
 from ..kernels.rk4 import rk4
 from ..plant import CartPendulum
-from ..validation import array, choice, mapping, multiple, number
+from ..validation import array, choice, mapping, multiple, number, shape_of, short
 from .protocol import Period
 
 Array = NDArray[np.float64]
@@ -118,8 +119,8 @@ class SlidingModeObserver:
         object.__setattr__(self, "xhat0", tuple(array("xhat0", self.xhat0, (4,)).tolist()))
         if not isinstance(self.compensation, bool):
             raise ValueError(f"compensation={self.compensation!r} must be True or False")
-        if np.shape(self.slopes) != (2,) or not all(isinstance(k, numbers.Real) and k > 0.0 for k in self.slopes):
-            raise ValueError(f"slopes={self.slopes!r} must be two positive numbers (math.inf for the exact sgn)")
+        if shape_of(self.slopes) != (2,) or not all(map(_is_slope, self.slopes)):
+            raise ValueError(f"slopes={short(self.slopes)} must be two positive numbers (math.inf for the exact sgn)")
         object.__setattr__(self, "slopes", tuple(map(float, self.slopes)))
         object.__setattr__(self, "time_constant", number("time_constant", self.time_constant))
         if self.time_constant < 0.0:
@@ -201,6 +202,10 @@ class SlidingModeObserver:
     def _gains(self) -> Gains:
         assert isinstance(self.gains, Gains)
         return self.gains
+
+
+def _is_slope(k: Any) -> bool:
+    return isinstance(k, numbers.Real) and bool(k == math.inf or 0.0 < k <= sys.float_info.max)  # type: ignore[operator]
 
 
 class _Bank:
