@@ -34,4 +34,4 @@ def measure(policy: MlpPolicy, stream: int = TEST, runs: int = 100, horizon: flo
     outcome = rollout(VectorObserverWrapper(env, **observer) if observer else env, policy, seed=seeds(stream, 1)[0])
     stood = ~outcome.failed
     means = {name: float(outcome.metrics[name][stood].mean()) for name in ("mse_h", "mse_theta")} if stood.any() else {}
-    return {"runs": runs, "failed": int(outcome.failed.sum()), **means}
+    return {"runs": int(runs), "failed": int(outcome.failed.sum()), **means}

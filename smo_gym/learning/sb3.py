@@ -95,6 +95,10 @@ class SB3VecEnv(VecEnv):
         wrapped = any(isinstance(layer, wrapper_class) for layer in self._layers())
         return [wrapped for _ in self._get_indices(indices)]
 
+    def _get_indices(self, indices: int | Iterable[int] | None) -> Iterable[int]:
+        """As the base class, which takes NumPy's integers for lists."""
+        return super()._get_indices(int(indices) if isinstance(indices, np.integer) else indices)
+
     def _all(self, call: str, indices: int | Iterable[int] | None) -> None:
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
             raise ValueError(f"{call}, indices={indices!r}): the slots are one batch, name all {self.num_envs} or none")

@@ -12,6 +12,7 @@ from typing import Any
 import gymnasium
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from ..envs.task import plain_data
 from ..evaluation import files
 from ..validation import choice, mapping, number, whole
 from .measurement import TRAINING, seeds
@@ -54,6 +55,10 @@ class Run:
     hyperparameters: dict[str, Any]
     """Of the algorithm."""
 
+    def plain(self) -> dict[str, Any]:
+        """Itself as JSON has it."""
+        return dict(plain_data(self))
+
     def checked(self) -> Run:
         """Itself, when an environment and an algorithm can be made of it.
 
@@ -71,6 +76,7 @@ class Run:
         counts = {"n_envs": self.n_envs, "n_timesteps": self.steps, "n_steps": given.get("n_steps")}
         for name, value in (counts | {name: given[name] for name in WHOLE if name in given}).items():
             whole(name, value, 1)
+        whole("seed", self.seed, 0)
         if not isinstance(given.get("policy_kwargs", {}), dict):
             raise ValueError(f"policy_kwargs={given['policy_kwargs']!r} must be a mapping, such as {{net_arch: [64]}}")
         built(self)

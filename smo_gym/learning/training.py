@@ -5,16 +5,18 @@ from __future__ import annotations
 import io
 import json
 import math
+import warnings
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from ..evaluation import files
-from ..validation import short
+from ..validation import short, whole
 from .measurement import TRAINING, VALIDATION, measure, seeds
 from .observations import KINDS, units
 from .policy import Card, LstmPolicy, MlpPolicy
@@ -52,8 +54,8 @@ def frozen(model: Any, run: Run) -> MlpPolicy:
         layers=(*(W.shape[1] for W, _ in weights), 1),
         lstm=lstm.hidden_size if lstm else None,
         force_limit=force_limit,
-        seed=run.seed,
-        configuration=asdict(run),
+        seed=int(run.seed),
+        configuration=run.plain(),
     )
     return LstmPolicy(card, weights, lstm_weights(lstm)) if lstm else MlpPolicy(card, weights)
 
@@ -99,6 +101,9 @@ class Watch(BaseCallback):
         # update would see one phase of them alone
         most = self.training_env.get_attr("task", 0)[0].steps
         self.training_env.set_options({"steps": np.random.default_rng(seed).integers(1, most, n, endpoint=True)})
+        model: Any = self.model
+        if model.use_sde:
+            model.policy.reset_noise(n)  # that of this rollout was drawn before the seed was set
         self.model._last_obs = self.training_env.reset()  # type: ignore[assignment]
         self.model._last_episode_starts = np.ones(n, dtype=np.bool_)
 
@@ -111,8 +116,7 @@ def state_bytes(model: Any) -> bytes:
     policy = model.policy
     found = {
         "policy": policy.state_dict(),
-        "optimizer": policy.optimizer.state_dict(),
-        "num_timesteps": model.num_timesteps,
+        "optimizer": policy.optimizer.state_dict()["state"],
         "n_updates": model._n_updates,
         "curve": curve(model),
     }
@@ -127,15 +131,32 @@ def restore(model: Any, path: Path) -> None:
     Raises:
         ValueError: the file cannot be read, or is of a model of another form.
     """
+    policy = model.policy
+    optimizer = policy.optimizer
     try:
-        found = torch.load(path, map_location="cpu", weights_only=True)
-        model.policy.load_state_dict(found["policy"])
-        model.policy.optimizer.load_state_dict(found["optimizer"])
-        model.num_timesteps, model._n_updates = int(found["num_timesteps"]), int(found["n_updates"])
-        model.curve = [{name: float(value) for name, value in point.items()} for point in found["curve"]]
+        with warnings.catch_warnings(action="ignore"):  # of pickles, which are then refused
+            found = torch.load(path, map_location="cpu", weights_only=True)
+        policy.load_state_dict(found["policy"])
+        optimizer.load_state_dict({**optimizer.state_dict(), "state": found["optimizer"]})
+        for parameter, moments in optimizer.state.items():
+            parts = [parameter, *(moment for moment in moments.values() if moment.ndim)]
+            if not all(part.shape == parameter.shape and part.isfinite().all() for part in parts):
+                raise ValueError("a tensor is not finite or of another shape")
+        points = found["curve"]
+        if not (points and optimizer.state) or any({"steps", "runs", "failed"} - point.keys() for point in points):
+            raise ValueError("something is missing")
+        if not all(math.isfinite(value) for point in points for value in point.values()):
+            raise ValueError("an evaluation is not finite")
+        model.curve, model.num_timesteps = points, whole("steps", points[-1]["steps"], 1)
+        model._n_updates = whole("n_updates", found["n_updates"], 1)
+    except UnpicklingError:
+        raise _damaged(path, "it holds something else than tensors and numbers, which could run any code") from None
     except Exception as error:  # whatever a damaged file may raise
-        reason = str(error).strip().splitlines() or [type(error).__name__]
-        raise ValueError(f"{path}: cannot be read ({reason[0]}): remove it to begin anew") from None
+        raise _damaged(path, files.shortened(str(error)) or type(error).__name__) from None
+
+
+def _damaged(path: Path, reason: str) -> ValueError:
+    return ValueError(f"{path}: cannot be read ({reason}): remove it to begin anew")
 
 
 def curve(model: Any) -> list[dict[str, float]]:
@@ -178,9 +199,10 @@ def train(
         files.refuse_pickle(folder / "checkpoint.zip")
     model = learner(run, env, log)
     frozen(model, run)  # what cannot be frozen is noticed now, not at the first checkpoint
-    agree(folder / "run.json", asdict(run), begun)
+    agree(folder / "run.json", run.plain(), begun)
     if begun:
         restore(model, checkpoint)
+        _see_best(folder, run)
     watch = Watch(run, checkpoint, progress)
     progress(model.num_timesteps, {})
     if model.num_timesteps < run.steps:
@@ -189,6 +211,15 @@ def train(
     policy = MlpPolicy.load(folder / BEST)
     card = policy.card.model_copy(update={"curve": curve(model), "measured": measure(policy)})
     return replace(policy, card=card)
+
+
+def _see_best(folder: Path, run: Run) -> None:
+    """See now, and not when all is learned, that the best policy so far is there."""
+    try:
+        if MlpPolicy.load(folder / BEST).card.configuration != run.plain():
+            raise ValueError(f"{folder / BEST}: is of another run")
+    except ValueError as error:
+        raise ValueError(f"{error}: the checkpoint goes on from it; empty the folder to begin anew") from None
 
 
 def agree(path: Path, settings: dict[str, Any], begun: bool) -> None:
@@ -205,7 +236,7 @@ def agree(path: Path, settings: dict[str, Any], begun: bool) -> None:
         found = json.loads(path.read_text(encoding="utf-8"))
         if not isinstance(found, dict):
             raise ValueError(f"{found!r} is no mapping of settings")
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ValueError(
             f"{path}: cannot be read ({error}): it says what run the checkpoint is of; empty the folder to begin anew"
         ) from None
