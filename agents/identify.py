@@ -32,6 +32,7 @@ from smo_gym.cli.entry import Stop, command
 from smo_gym.evaluation import files, scenario
 from smo_gym.evaluation.identification import Hypothesis, Problem, Search, cost, profile
 from smo_gym.evaluation.problems import Lqr, Regulation, Tracking
+from smo_gym.validation import short
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 STATE = "state.json"
@@ -144,8 +145,11 @@ def resume(path: Path, plan: dict[str, Any]) -> list[Costs]:
         before, costs = state["plan"], list(state["costs"])
     except (ValueError, KeyError, TypeError, RecursionError):
         raise ValueError(f"{path} is damaged: remove it to start anew") from None
-    if before != plan:
-        raise ValueError(f"{path} belongs to a run with {before}, not {plan}: choose another --out or remove it")
+    if not isinstance(before, dict) or before.keys() != plan.keys():
+        raise ValueError(f"{path} is damaged: remove it to start anew")
+    if others := [name for name in plan if before[name] != plan[name]]:
+        there, here = (", ".join(f"--{name} {short(one[name])}" for name in others) for one in (before, plan))
+        raise ValueError(f"{path} belongs to a run with {there}, not {here}: choose another --out or remove it")
     return costs
 
 

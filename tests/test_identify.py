@@ -85,6 +85,41 @@ def test_a_search_begins_where_it_is_told(problem):
     np.testing.assert_allclose(search.best, KNOWN, atol=0.3)
 
 
+@pytest.fixture(scope="module")
+def through(problem):
+    """A search of three generations."""
+    search = Search(problem, Hypothesis(), 0)
+    for _ in range(3):
+        search.step()
+    return search
+
+
+def test_costs_bring_a_search_back_to_the_bit(problem, through):
+    again = Search(problem, Hypothesis(), 0, costs=json.loads(json.dumps(through.costs[:2])))
+    again.step()
+    assert again.costs == through.costs
+    assert np.array_equal(again.best, through.best)
+    assert again.rms == through.rms
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda costs: [costs[0], [*costs[1][:-1], 0.001]], "gives other costs"),
+        (lambda costs: costs * 2, "gives other costs"),
+        (lambda costs: costs[1:], "gives other costs"),
+        (lambda costs: [costs[0][:11]], r"it must have shape \(12,\)"),
+        (lambda costs: [["x"] * 12], "must be an array of numbers"),
+        (lambda costs: [[10**400] * 12], "must be an array of numbers"),
+        (lambda costs: [[None] * 12], "must be finite"),
+    ],
+)
+def test_costs_of_another_search_are_refused(problem, through, change, message):
+    """A cost that was changed, another version of cma, other plants: all would end in a wrong number."""
+    with pytest.raises(ValueError, match=message):
+        Search(problem, Hypothesis(), 0, costs=change(through.costs[:2]))
+
+
 def identify(out, *options):
     command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--restarts", "1", "--refit", "0"]
     return [*command, *options, "--out", str(out)]
@@ -113,7 +148,7 @@ def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
         identify(tmp_path / "stopped", "--generations", "4"), capture_output=True, text=True, check=False
     )
     assert other.returncode == 2
-    assert "belongs to a run with" in other.stderr
+    assert "belongs to a run with --generations 3, not --generations 4: choose another --out" in other.stderr
 
 
 def test_bad_arguments_are_named(tmp_path):

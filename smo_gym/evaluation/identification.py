@@ -10,6 +10,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..validation import array
+
 Array = NDArray[np.float64]
 
 
@@ -59,7 +61,8 @@ class Search:
         seed: of the search, and of its start where none is given.
         start: where to begin, on the log10 scale, instead of at random.
         population: candidates a generation.
-        costs: those of an interrupted search, a list of ``population`` numbers a generation: it goes on from there.
+        costs: those of an interrupted search, a list of ``population`` numbers a generation: it goes on from there. The
+            last generation is evaluated again, to see that they are of this search.
 
     Raises:
         ValueError: the costs are not of such a search.
@@ -96,10 +99,14 @@ class Search:
         self.costs: list[list[float]] = []
         """RMS of each candidate, generation by generation."""
         for row in costs:
-            known = np.array(row, dtype=np.float64)
-            if known.shape != (population,):
-                raise ValueError(f"a generation has {known.size} costs, it must have {population}")
-            self._tell(np.array(self.strategy.ask()), known)
+            points, known = np.array(self.strategy.ask()), array("costs", row, (population,))
+            self._tell(points, known)
+        # another cma, numpy or problem asks for other points: the last of them show it
+        if len(costs) and not np.array_equal(cost(problem, points, hypothesis), known):
+            raise ValueError(
+                f"generation {len(costs)} {hypothesis.name!r} gives other costs than it holds: they were changed, or "
+                "the machine, the settings or the versions of smo_gym, cma and numpy were"
+            )
 
     @property
     def generations(self) -> int:
