@@ -13,7 +13,7 @@ from .kernels.batch import LANES, for_slots, load, store
 from .kernels.cart_pendulum import drift_and_gain, energy
 from .kernels.cart_pendulum import plant as _plant
 from .kernels.rk4 import rk4
-from .validation import array, mapping, number
+from .validation import array, mapping, number, short
 
 Array = NDArray[np.float64]
 STATE_NAMES = ("h", "theta", "h_dot", "theta_dot")
@@ -103,7 +103,7 @@ class CartPendulum:
 
         ``(M_c + m) h'^2 / 2 + m l^2 theta'^2 / 2 + m l h' theta' cos theta + m g l cos theta``
         """
-        _, theta, v, omega = np.asarray(x, dtype=np.float64)
+        _, theta, v, omega = _states(x)
         return np.asarray(plain(energy)(np.cos(theta), v, omega, *self.as_array()))
 
     def drift(self, x: ArrayLike) -> Array:
@@ -115,8 +115,8 @@ class CartPendulum:
         return self._split(x)[1]
 
     def _split(self, x: ArrayLike) -> tuple[Array, Array]:
-        states = np.asarray(x, dtype=np.float64)
-        if states.shape[:1] != (4,) or states.ndim > 2:
+        states = _states(x)
+        if states.ndim > 2:
             raise ValueError(f"x has shape {states.shape}, it must have shape (4,) or (4, n)")
         batch = np.ascontiguousarray(states.reshape(4, -1))
         f, g = np.empty_like(batch), np.empty_like(batch)
@@ -139,6 +139,16 @@ class CartPendulum:
         A[3, 1] = sign * (M_c + m) * g / (M_c * l)
         B = np.array([[0.0], [0.0], [1.0 / M_c], [-sign / (M_c * l)]])
         return A, B
+
+
+def _states(x: ArrayLike) -> Array:
+    try:
+        states = np.asarray(x, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f"x={short(x)} must be an array of numbers of shape (4,) or (4, n)") from None
+    if states.shape[:1] != (4,):
+        raise ValueError(f"x has shape {states.shape}, it must have shape (4,) or (4, n)")
+    return states
 
 
 def advance(x: Array, params: Array, u: Array, dt: float, samples: Array) -> None:

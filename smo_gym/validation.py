@@ -91,6 +91,17 @@ def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.flo
     return result
 
 
+def switch(name: str, value: Any) -> bool:
+    """True or False, Python's or NumPy's.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name}={short(value)} must be True or False")
+    return bool(value)
+
+
 def shape_of(value: Any) -> tuple[int, ...] | None:
     """The shape of what may be an array; None for rows of different lengths."""
     try:

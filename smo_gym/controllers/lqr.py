@@ -9,7 +9,7 @@ from numpy.linalg import LinAlgError
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_continuous_are
 
-from ..validation import array, shape_of, short
+from ..validation import array, shape_of, short, switch
 from .feedback import estimated_error, nominal, weights
 
 Array = NDArray[np.float64]
@@ -33,7 +33,7 @@ class LQR:
         if shape is None or shape[-1:] != (4,) or len(shape) > 2:
             raise ValueError(f"K has shape {shape}, it must have shape (4,) or (n, 4)")
         self.K = np.atleast_2d(array("K", K, shape))
-        self.wrap = wrap
+        self.wrap = switch("wrap", wrap)
 
     @classmethod
     def design(cls, Q: ArrayLike, R: ArrayLike, model: Any = None, wrap: bool = True) -> LQR:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..article import SMC_GAINS
 from ..kernels import kernel
 from ..kernels.elementary import sincos, tanh
-from ..validation import array, number, shape_of, short
+from ..validation import array, number, shape_of, short, switch
 from .feedback import estimated_error
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ class SlidingModeController:
         self.Z0 = number("Z0", Z0, above=0.0)
         self.lam = number("lam", lam, above=0.0)
         self.epsilon = number("epsilon", epsilon, above=0.0)
-        self.wrap = wrap
+        self.wrap = switch("wrap", wrap)
         rows = [self.k, np.broadcast_to(np.minimum(self.slope, 1e300)[..., None], (*shape[:-1], 1))]  # 1e300: sgn
         self._gains = np.atleast_2d(np.concatenate(rows, axis=-1))
         self._settings = np.array([self.Z0, self.lam, math.pi / self.epsilon, self.dt])
@@ -96,6 +96,8 @@ class SlidingModeController:
         if len(self._gains) not in (1, n):
             raise ValueError(f"k has {len(self._gains)} slots, the observation has shape {np.shape(observation)}")
         integral = np.zeros(n) if state is None else array("state[0]", state[0], (n,))
+        if shape_of(episode_start) not in ((), (n,)):
+            raise ValueError(f"episode_start={short(episode_start)} must hold {n} flags, one a slot")
         if episode_start is not None:
             integral[np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), n)] = 0.0
         u = np.empty((n, 1))

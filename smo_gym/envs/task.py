@@ -19,6 +19,7 @@ from ..validation import array, limit, mapping, multiple, number, shape_of, shor
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+_FURTHEST = 10_000  # control instants of a preview: an observation holds four numbers of each
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +108,8 @@ class Task:
                 f"reference was computed for the plant {self.reference.params}, it must be for params={self.params}"
             )
         set_(self, "preview", whole("preview", self.preview, 0))
+        if self.preview > _FURTHEST:
+            raise ValueError(f"preview={self.preview} must be at most {_FURTHEST} control instants")
         for name in ("force_limit", "track_limit", "angle_limit"):
             set_(self, name, limit(name, getattr(self, name)))
         low, high = self._box()

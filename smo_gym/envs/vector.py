@@ -65,7 +65,11 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         if max_episode_steps is not None:
             steps = min(whole("max_episode_steps", max_episode_steps, 1), self.task.steps)
             self.task = replace(self.task, horizon=steps * self.task.control_period)
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        try:
+            self.autoreset_mode = AutoresetMode(autoreset_mode)
+        except ValueError:
+            modes = ", ".join(repr(mode.value) for mode in AutoresetMode)
+            raise ValueError(f"autoreset_mode={short(autoreset_mode)} must be one of {modes}") from None
         self.metadata = {**self.scalar.metadata, "render_modes": ["rgb_array"], "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = self.task.observation_space
         self.single_action_space = self.task.action_space

@@ -19,7 +19,7 @@ from ..kernels.cart_pendulum import drift_and_gain
 from ..kernels.elementary import tanh
 from ..kernels.rk4 import rk4
 from ..plant import CartPendulum
-from ..validation import array, choice, mapping, multiple, number, shape_of, short
+from ..validation import array, choice, mapping, multiple, number, shape_of, short, switch
 from .protocol import Period
 
 Array = NDArray[np.float64]
@@ -117,8 +117,7 @@ class SlidingModeObserver:
         if self.model is not None:
             object.__setattr__(self, "model", CartPendulum.of(self.model, name="model"))
         object.__setattr__(self, "xhat0", tuple(array("xhat0", self.xhat0, (4,)).tolist()))
-        if not isinstance(self.compensation, bool):
-            raise ValueError(f"compensation={self.compensation!r} must be True or False")
+        object.__setattr__(self, "compensation", switch("compensation", self.compensation))
         if shape_of(self.slopes) != (2,) or not all(map(_is_slope, self.slopes)):
             raise ValueError(f"slopes={short(self.slopes)} must be two positive numbers (math.inf for the exact sgn)")
         object.__setattr__(self, "slopes", tuple(map(float, self.slopes)))
