@@ -2,6 +2,7 @@
 
 import enum
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -26,6 +27,11 @@ from smo_gym import validation
         (lambda: validation.choice("arm", ["with"], ["with"]), "unknown arm"),
         (lambda: validation.mapping("option", 5, ["a"]), "option: 5 must be a mapping"),
         (lambda: smo_gym.reference.shipped().trajectory(0.0), "dt=0.0 must be"),
+        (lambda: smo_gym.LQR([1, 1, 1, 1], wrap="x"), "wrap='x' must be True or False"),
+        (lambda: smo_gym.CartPendulum().drift("abcd"), "x='abcd' must be an array of numbers"),
+        (lambda: smo_gym.CartPendulum().energy([1.0]), r"x has shape \(1,\), it must have shape"),
+        (lambda: smo_gym.SlidingModeObserver(slopes=(10**400, 1)), r"slopes=\(1000.* must be two positive numbers"),
+        (lambda: gymnasium.make("SMOPendulumTracking-v0", preview=10**9), "preview=1000000000 must be at most 10000"),
         (lambda: smo_gym.set_threads("2"), "threads='2' must be a positive integer"),
     ],
 )
