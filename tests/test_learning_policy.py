@@ -229,8 +229,28 @@ def test_an_action_has_the_same_bits_in_every_batch(kind):
 
 def test_a_policy_that_lacks_its_observer_says_what_to_do():
     policy = shipped("SMOPendulum-v0")
-    with pytest.raises(ValueError, match=r"wrap it in smo_gym\.ObserverWrapper"):
+    wrapped = r"smo_gym\.ObserverWrapper\(env, observer='smo', .*, compensation=True\), .*VectorObserverWrapper"
+    with pytest.raises(ValueError, match=f"wrap it in {wrapped}"):
         policy.predict(np.zeros(2))
-    with pytest.raises(ValueError, match="observation='abc' must be an array of numbers"):
-        policy.predict("abc")
+    with pytest.raises(ValueError, match=r"has shape \(4, 10\).*'smo', 6 entries$"):
+        policy.predict(np.zeros((4, 10)))
+    for wrong in ("abc", None, [None] * 6, ["1"] * 6, [1j] * 6, [10**400] * 6, [True] * 6, [[0.0] * 6, [0.0]]):
+        with pytest.raises(ValueError, match="observation=.* must be an array of numbers"):
+            policy.predict(wrong)
+    assert policy.predict(np.zeros((0, 6)))[0].shape == (0, 1)
     assert np.array_equal(policy.predict([0.0] * 6)[0], policy.predict(np.zeros(6))[0])
+
+
+@pytest.mark.parametrize(("observation", "algorithm"), [("stacked", "ppo"), ("positions", "recurrent")])
+def test_a_state_of_other_observations_is_refused(observation, algorithm):
+    """One of five slots would broadcast to one observation, silently."""
+    _, policy = untrained(observation, algorithm)
+    state = policy.predict(np.zeros((5, 2)))[1]
+    for wrong in (state, "abc", (), state + state, tuple(part[:1, :1] for part in state)):
+        for seen in (np.zeros(2), np.zeros((3, 2))):
+            with pytest.raises(ValueError, match=r"state has shapes .*, it must have .* or None at the start"):
+                policy.predict(seen, wrong)
+    for start in (np.ones(4, dtype=bool), np.ones((5, 1), dtype=bool)):
+        with pytest.raises(ValueError, match=r"episode_start has shape .*, it must be one flag or have shape \(5,\)"):
+            policy.predict(np.zeros((5, 2)), state, start)
+    policy.predict(np.zeros((5, 2)), state, True)

@@ -17,9 +17,10 @@ from safetensors.numpy import save as tensor_bytes
 
 from ..envs.task import HANGING
 from ..evaluation import files
-from ..validation import choice, short
+from ..validation import choice
 from .forward import affine, sigmoid, tanh
-from .observations import KINDS, scaled
+from .memory import recalled, stacked, starts
+from .observations import KINDS, numbers, scaled
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -125,7 +126,8 @@ class MlpPolicy:
         ``episode_start`` is true, and everywhere without a state. The policy is always deterministic.
 
         Raises:
-            ValueError: the observation is of another environment or lacks its observer.
+            ValueError: the observation is of another environment or lacks its observer, or state or starts are of other
+                observations.
         """
         frame = scaled(self._seen(observation), np.array(self.card.units))
         seen, state = self._remember(np.atleast_2d(frame), state, episode_start)
@@ -142,23 +144,28 @@ class MlpPolicy:
         """Inputs of the first layer from the newest frame (n, entries) and what came before."""
         if self.card.frames == 1:
             return frame, state
-        frames = stacked(frame, self.card.frames, None if state is None else state[0], episode_start)
+        known = recalled(state, (len(frame), self.card.frames, frame.shape[1]))
+        frames = stacked(frame, self.card.frames, known[0] if known else None, episode_start)
         return frames.reshape(len(frame), -1), (frames,)
 
     def _seen(self, given: Any) -> Array:
-        try:
-            observation = np.asarray(given, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise ValueError(f"observation={short(given)} must be an array of numbers") from None
-        size, observed = len(self.card.units), KINDS[self.card.observation].observer
-        allowed = (size,) if observed else (size, size + 4)
-        if observation.ndim not in (1, 2) or observation.shape[-1] not in allowed:
-            way_out = ": wrap it in smo_gym.ObserverWrapper or smo_gym.VectorObserverWrapper" if observed else ""
+        observation = numbers(given)
+        size, observer = len(self.card.units), KINDS[self.card.observation].observer
+        allowed = (size,) if observer else (size, size + 4)
+        if observation.shape[-1] not in allowed:
+            bare = observer and observation.shape[-1] == size - 4
             raise ValueError(
                 f"observation has shape {observation.shape}: this policy of {self.card.environment} sees "
-                f"{self.card.observation!r}, {' or '.join(map(str, allowed))} entries{way_out}"
+                f"{self.card.observation!r}, {' or '.join(map(str, allowed))} entries{self._way_out if bare else ''}"
             )
         return observation[..., :size]
+
+    @property
+    def _way_out(self) -> str:
+        """How an environment that tells positions alone tells the estimate too."""
+        observer = KINDS[self.card.observation].observer or {}
+        settings = "".join(f", {name}={value!r}" for name, value in observer.items())
+        return f": wrap it in smo_gym.ObserverWrapper(env{settings}), a batch in smo_gym.VectorObserverWrapper"
 
     def save(self, path: Path) -> None:
         """Write ``path`` (.safetensors) and the card beside it (.json), which belong together, the weights last."""
@@ -208,18 +215,6 @@ class MlpPolicy:
             raise ValueError(f"{path}: {error}") from None
 
 
-def stacked(frame: Array, count: int, past: Array | None, episode_start: NDArray[np.bool_] | None) -> Array:
-    """The last frames, the newest last, (n, count, entries), from the newest (n, entries) and those before.
-
-    Where an episode starts, and everywhere without a past, the first is repeated.
-    """
-    repeated = np.repeat(frame[:, None], count, axis=1)
-    if past is None:
-        return repeated
-    frames = np.concatenate([past[:, 1:], frame[:, None]], axis=1)
-    return np.where(_starts(episode_start)[:, None, None], repeated, frames)
-
-
 LSTM = ("lstm.weight_ih", "lstm.weight_hh", "lstm.bias_ih", "lstm.bias_hh")
 
 
@@ -252,8 +247,9 @@ class LstmPolicy(MlpPolicy):
         self, frame: Array, state: tuple[Array, ...] | None, episode_start: NDArray[np.bool_] | None
     ) -> tuple[Array, tuple[Array, ...] | None]:
         W, U, b, d = self.lstm
-        h, c = state or (np.zeros((len(frame), U.shape[1])),) * 2
-        keep = ~_starts(episode_start)[..., None]
+        shape = (len(frame), U.shape[1])
+        h, c = recalled(state, shape, shape) or (np.zeros(shape),) * 2
+        keep = ~starts(episode_start, len(frame))[:, None]
         gates = affine(U, (h * keep).T, affine(W, frame.T, b + d))
         i, f, g, o = np.split(gates.T, 4, axis=1)
         c = sigmoid(f) * c * keep + sigmoid(i) * tanh(g)
@@ -262,10 +258,6 @@ class LstmPolicy(MlpPolicy):
 
     def _memory(self) -> dict[str, Array]:
         return dict(zip(LSTM, self.lstm, strict=True))
-
-
-def _starts(episode_start: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
-    return np.atleast_1d(np.asarray(False if episode_start is None else episode_start, dtype=np.bool_))
 
 
 def _read(path: Path) -> bytes:

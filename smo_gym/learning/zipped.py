@@ -15,8 +15,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from ..envs.task import HANGING
-from .observations import KINDS, scaled, units
-from .policy import stacked
+from .memory import stacked
+from .observations import KINDS, numbers, scaled, units
 
 try:
     from stable_baselines3.common.save_util import load_from_zip_file
@@ -56,8 +56,9 @@ class ZipPolicy:
             ValueError: the observation is of another environment.
         """
         size = len(self.units)
-        if observation.shape[-1] not in (size, size + 4) or (size == 6 and observation.shape[-1] != 6):
-            raise ValueError(f"observation has shape {observation.shape}, the model sees {size} entries of it")
+        observation = numbers(observation)
+        if observation.ndim != 2 or observation.shape[1] not in ((size,) if size == 6 else (size, size + 4)):
+            raise ValueError(f"observation has shape {observation.shape}, the model sees {size} entries of each row")
         past, own = (None, None) if state is None else state
         frames = stacked(scaled(observation[:, :size], self.units), self.frames, past, episode_start)
         seen = frames.reshape(len(frames), -1).astype(np.float32)
