@@ -55,3 +55,19 @@ def test_upright_none_of_a_hundred_plants_falls():
     result = rollout(VectorObserverWrapper(env, **KINDS["smo"].observer), policy, seed=0, options={"state": starts})
     assert not result.failed.any()
     assert result.metrics["duration"] == pytest.approx(np.full(100, 35.0))
+
+
+def test_what_is_measured_beside_it_does_not_change_a_bit():
+    """One batch holds all arms and plants of a study; the policy's sums do not depend on its size."""
+    short = scenario.Setting[float](value=1.0, source="chosen")
+    limit = scenario.Setting[float | None](value=30.0, source="chosen")
+    place = TABLE_4.model_copy(update={"horizon": short, "force_limit": limit}).with_agent("ppo")
+
+    def errors(controllers, arms):
+        outcomes = study.measure(study.groups([place], controllers, arms, 3), 0)
+        return [one.metrics["mse_h"] for one in outcomes if (one.group.controller, one.group.arm) == ("ppo", "with")]
+
+    alone = errors(["ppo"], ["with"])
+    assert len(alone) == len({0.0, *place.uncertainty.value})
+    assert all(map(np.array_equal, alone, errors(["ppo"], ["without", "with", "oracle"])))
+    assert all(map(np.array_equal, alone, errors(["lqr", "ppo"], ["without", "with"])))

@@ -15,6 +15,7 @@ from stable_baselines3 import PPO
 
 from smo_gym import ObserverWrapper
 from smo_gym.learning import MlpPolicy, shipped
+from smo_gym.learning.forward import affine
 from smo_gym.learning.observations import KINDS, UNITS, agent_view
 from smo_gym.learning.policy import Card, LstmPolicy
 from smo_gym.learning.settings import Run, built
@@ -214,17 +215,37 @@ def test_an_action_has_the_same_bits_in_every_batch(kind):
     layers = [(rng.normal(size=(k, m)) / 8, rng.normal(size=k)) for m, k in ((width, 64), (64, 64), (64, 1))]
     lstm = tuple(rng.normal(size=s) / 8 for s in ((256, size), (256, 64), (256,), (256,)))
     policy = LstmPolicy(card, layers, lstm) if kind == "lstm" else MlpPolicy(card, layers)
-    runs = {n: [] for n in (1, 7, 300)}
+    runs = {n: [] for n in (1, 2, 3, 7, 300)}
     observations = rng.normal(size=(3, 300, size))
     for n, found in runs.items():
         state = None
         for seen in observations:
             action, state = policy.predict(seen[:n], state)
             found.append(action)
-    for n in (1, 7):
+    for n in (1, 2, 3, 7):
         assert all(np.array_equal(a, b[:n]) for a, b in zip(runs[n], runs[300], strict=True))
     alone, _ = policy.predict(observations[0, 5])
     assert np.array_equal(alone, runs[300][0][5])
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 64), (3, 5), (4, 4), (9, 6), (64, 64)])
+def test_sums_of_any_shape_are_right_and_the_same_in_every_batch(shape):
+    """Few slots and many are summed in different loops."""
+    rng = np.random.default_rng(0)
+    W, x, b = rng.normal(size=shape), rng.normal(size=(shape[1], 131)), rng.normal(size=shape[0])
+    together = affine(W, x, b)
+    np.testing.assert_allclose(together, W @ x + b[:, None], atol=1e-13)
+    for n in (1, 2, 3, 64, 65, 130):
+        assert np.array_equal(affine(W, x[:, :n], b), together[:, :n])
+        assert np.array_equal(affine(W, x[:, -n:], b), together[:, -n:])
+    assert affine(W, x[:, :0], b).shape == (shape[0], 0)
+
+
+def test_the_shipped_policy_acts_alone_as_among_thousands():
+    policy = shipped("SMOPendulum-v0")
+    observations = np.random.default_rng(0).normal(size=(5000, 6))
+    together, _ = policy.predict(observations)
+    assert np.array_equal(together, np.stack([policy.predict(one)[0] for one in observations]))
 
 
 def test_a_policy_that_lacks_its_observer_says_what_to_do():

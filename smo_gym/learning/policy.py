@@ -18,7 +18,7 @@ from safetensors.numpy import save as tensor_bytes
 from ..envs.task import HANGING
 from ..evaluation import files
 from ..validation import choice
-from .forward import affine, sigmoid, tanh
+from .forward import affine, dense, lstm
 from .memory import recalled, stacked, starts
 from .observations import KINDS, numbers, scaled
 
@@ -133,7 +133,7 @@ class MlpPolicy:
         seen, state = self._remember(np.atleast_2d(frame), state, episode_start)
         inputs = seen.T
         for W, b in self.layers[:-1]:
-            inputs = tanh(affine(W, inputs, b))
+            inputs = dense(W, inputs, b)
         W, b = self.layers[-1]
         u = self.card.force_limit * np.clip(affine(W, inputs, b), -1.0, 1.0).T
         return (u if frame.ndim == 2 else u[0]), state
@@ -251,9 +251,7 @@ class LstmPolicy(MlpPolicy):
         h, c = recalled(state, shape, shape) or (np.zeros(shape),) * 2
         keep = ~starts(episode_start, len(frame))[:, None]
         gates = affine(U, (h * keep).T, affine(W, frame.T, b + d))
-        i, f, g, o = np.split(gates.T, 4, axis=1)
-        c = sigmoid(f) * c * keep + sigmoid(i) * tanh(g)
-        h = sigmoid(o) * tanh(c)
+        h, c = (part.T for part in lstm(gates, (c * keep).T))
         return h, (h, c)
 
     def _memory(self) -> dict[str, Array]:
