@@ -110,6 +110,21 @@ def shape_of(value: Any) -> tuple[int, ...] | None:
         return None
 
 
+def observed(observation: Any) -> NDArray[np.float64]:
+    """An observation, or several as rows, as an array of floats.
+
+    Raises:
+        ValueError: it is neither.
+    """
+    shape = shape_of(observation)
+    found = np.asarray(observation if shape is not None else "")
+    if found.dtype.kind not in "fiu" or found.ndim not in (1, 2):
+        raise ValueError(
+            f"observation={short(observation)} must be an array of numbers: one observation, or some as rows"
+        )
+    return found.astype(np.float64, copy=False)
+
+
 def multiple(name: str, value: Any, of_name: str, of: float) -> int:
     """How many times ``of`` goes into ``value``: a whole number from 1 to :data:`MOST`.
 

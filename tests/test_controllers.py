@@ -180,5 +180,6 @@ def test_within_half_a_turn_wrapping_changes_no_bit():
 def test_lists_are_taken_and_other_types_are_named():
     law = LQR([1.0, 2.0, 3.0, 4.0])
     assert np.array_equal(law.predict([0.0, 0.0, 1.0, 1.0, 1.0, 1.0])[0], [-10.0])
-    with pytest.raises(ValueError, match="observation='abc' must be an array of numbers"):
-        law.predict("abc")
+    for bad in ("abc", None, [None] * 6, [10**400] * 6, [True] * 6, [[0.0], [1.0, 2.0]], np.zeros((1, 1, 6))):
+        with pytest.raises(ValueError, match="observation=.* must be an array of numbers"):
+            law.predict(bad)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..envs.task import Task
 from ..plant import CartPendulum
-from ..validation import array, number, shape_of, short
+from ..validation import array, number, observed, shape_of, short
 
 Array = NDArray[np.float64]
 
@@ -26,11 +26,8 @@ def estimated_error(observation: ArrayLike, wrap: bool) -> Array:
     Raises:
         ValueError: the observation cannot come from an observer wrapper.
     """
-    try:
-        seen = np.asarray(observation, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"observation={short(observation)} must be an array of numbers") from None
-    size = seen.shape[-1] if seen.ndim in (1, 2) else 0
+    seen = observed(observation)
+    size = seen.shape[-1]
     if size < 6 or (size - 2) % 4:
         raise ValueError(
             f"observation has shape {seen.shape}, it must begin with [h, theta] and end with xhat (4): "

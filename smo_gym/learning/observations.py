@@ -20,7 +20,7 @@ from gymnasium.vector.utils import batch_space
 from gymnasium.wrappers import FlattenObservation, FrameStackObservation
 from numpy.typing import NDArray
 
-from ..validation import choice, shape_of, short
+from ..validation import choice
 from ..wrappers import ObserverWrapper, VectorObserverWrapper, task_of
 
 Array = NDArray[np.float64]
@@ -69,21 +69,6 @@ def units(size: int) -> Array:
 def scaled(observation: Array, units: Array) -> Array:
     """The observation in its units, finite and bounded."""
     return np.fmax(np.fmin(observation / units, LIMIT), -LIMIT)  # unlike clip they leave no NaN
-
-
-def numbers(observation: Any) -> Array:
-    """An observation, or several as rows, as an array of floats.
-
-    Raises:
-        ValueError: it is neither.
-    """
-    shape = shape_of(observation)
-    found = np.asarray(observation if shape is not None else "")
-    if found.dtype.kind not in "fiu" or found.ndim not in (1, 2):
-        raise ValueError(
-            f"observation={short(observation)} must be an array of numbers: one observation, or some as rows"
-        )
-    return found.astype(np.float64, copy=False)
 
 
 def agent_view(env: gymnasium.Env[Array, Array], observation: str = "smo") -> gymnasium.Env[Any, Any]:

@@ -17,10 +17,10 @@ from safetensors.numpy import save as tensor_bytes
 
 from ..envs.task import HANGING
 from ..evaluation import files
-from ..validation import choice
+from ..validation import choice, observed
 from .forward import affine, dense, lstm
 from .memory import recalled, stacked, starts
-from .observations import KINDS, numbers, scaled
+from .observations import KINDS, scaled
 
 Array = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -149,7 +149,7 @@ class MlpPolicy:
         return frames.reshape(len(frame), -1), (frames,)
 
     def _seen(self, given: Any) -> Array:
-        observation = numbers(given)
+        observation = observed(given)
         size, observer = len(self.card.units), KINDS[self.card.observation].observer
         allowed = (size,) if observer else (size, size + 4)
         if observation.shape[-1] not in allowed:

@@ -15,8 +15,9 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from ..envs.task import HANGING
+from ..validation import observed
 from .memory import stacked
-from .observations import KINDS, numbers, scaled, units
+from .observations import KINDS, scaled, units
 
 try:
     from stable_baselines3.common.save_util import load_from_zip_file
@@ -56,7 +57,7 @@ class ZipPolicy:
             ValueError: the observation is of another environment.
         """
         size = len(self.units)
-        observation = numbers(observation)
+        observation = observed(observation)
         if observation.ndim != 2 or observation.shape[1] not in ((size,) if size == 6 else (size, size + 4)):
             raise ValueError(f"observation has shape {observation.shape}, the model sees {size} entries of each row")
         past, own = (None, None) if state is None else state
