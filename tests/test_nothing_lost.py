@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+import smo_gym
 from smo_gym.cli import arguments
 from smo_gym.evaluation import files
 
@@ -90,14 +91,15 @@ def test_a_package_that_is_not_installed_has_an_unknown_version(short, tmp_path,
     version = metadata.version
 
     def missing(name):
-        if name == "smo_gym":
+        if name in ("smo_gym", "scipy"):
             raise metadata.PackageNotFoundError(name)
         return version(name)
 
     monkeypatch.setattr(metadata, "version", missing)
     assert load("evaluate").main(short) == 0
     settings = yaml.safe_load((tmp_path / "out" / "settings.yaml").read_text())
-    assert settings["versions"]["smo_gym"] == "unknown"
+    assert settings["versions"]["scipy"] == "unknown"
+    assert settings["versions"]["smo_gym"] == smo_gym.__version__
 
 
 @posix

@@ -105,7 +105,7 @@ def environment(name: str) -> str:
     parts = [tabulate(facts, ("", ""), "github", disable_numparse=True)]
     if cls is not base:
         parts += [_text(cls), _differences(env.unwrapped.task), "What follows holds for all three environments."]
-    parts += [_text(base), f"## Version History\n\n- `{name}`: the first version; smo_gym {smo_gym.__version__}"]
+    parts += [_text(base), f"## Version History\n\n- `{name}`: the first version, since smo_gym 0.1.0"]
     return "\n\n".join(parts)
 
 

@@ -12,6 +12,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NoReturn
 
+from .. import __version__
 from ..validation import unknown
 
 PACKAGES = ("smo_gym", "gymnasium", "numba", "numpy", "scipy")
@@ -45,9 +46,15 @@ class _Version(argparse.Action):
 
 
 def versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
-    """Of Python and of packages; "unknown" of one that is not installed, such as a checkout on PYTHONPATH."""
+    """Of Python and of packages: of this one that of the code that runs, of another "unknown" if not installed.
+
+    Metadata of this package would be wrong of a checkout that has changed since it was installed.
+    """
     found = {"python": platform.python_version()}
     for name in packages:
+        if name == "smo_gym":
+            found[name] = __version__
+            continue
         try:
             found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
