@@ -16,14 +16,15 @@ if __name__ == "__main__":  # before the imports below, which take seconds
 
 import argparse
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from tqdm import tqdm
 
 from smo_gym.cli.arguments import Parser, positive, whole
 from smo_gym.cli.entry import command
-from smo_gym.evaluation import files, scenario, study
+from smo_gym.cli.progress import simulated
+from smo_gym.evaluation import files, formats, scenario
 from smo_gym.learning import comparison
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "regulation.yaml"
@@ -77,16 +78,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with files.claimed(args.out, RESULTS) as out:
         for line in left_out:
             print(line, file=sys.stderr)
-        with tqdm(
-            total=study.simulated_seconds(groups),
-            unit="s",
-            unit_scale=True,
-            desc="simulated",
-            leave=False,
-            disable=None,
-        ) as bar:
+        with simulated(groups) as bar:
             scores = comparison.measure(place, contenders, args.runs, args.seed, bar.update)
-        rows, answers = [], []
+        rows: list[table.Row] = []
+        answers: dict[str, list[str]] = {}
         asked = table.questions(scores)
         count = len(scores) + sum(len(pairs) for _, pairs in asked)
         with tqdm(total=count, unit="interval", leave=False, disable=None) as bar:
@@ -94,11 +89,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 rows.append(table.Row(one, aggregates.interquartile_means(one)))
                 bar.update()
             for question, pairs in asked:
-                answers += [f"\n{question}\n", *([] if pairs else ["- open: there are no such runs"])]
+                answers[question] = [] if pairs else ["open: there are no such runs"]
                 for a, b in pairs:
-                    answers.append(f"- {table.sentence(aggregates.compare(a, b))}")
+                    answers[question].append(table.sentence(aggregates.compare(a, b)))
                     bar.update()
-        words, levels = "\n".join(answers), place.uncertainty.value
+        levels = place.uncertainty.value
         told = (
             "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
             f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. "
@@ -109,15 +104,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
         texts = (
             table.aggregate_csv(rows, levels),
             table.runs_csv(rows, levels),
-            f"{told}\n{table.render(rows, levels, 'github')}\n{words}\n",
+            f"{told}\n{table.render(rows, levels, 'github')}\n{words(answers, 'github')}\n",
         )
         try:
             files.write_set(out, dict(zip(RESULTS, texts, strict=True)))
         finally:  # what cannot be written can be read at least
             print(table.render(rows, levels, "simple"))
-            print(words)
+            print(words(answers, "simple"))
     print(f"\nresults are in {out}")
     return 0
+
+
+def words(answers: Mapping[str, Sequence[str]], form: str) -> str:
+    """Each question with its answers below."""
+    return "\n".join(
+        "\n".join([f"\n{question}\n", *(f"- {formats.escaped(one, form)}" for one in answers[question])])
+        for question in answers
+    )
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ from tqdm import tqdm
 
 from smo_gym.cli.arguments import Parser, fraction, one_of, positive, several, versions, whole
 from smo_gym.cli.entry import Stop, command, said
+from smo_gym.cli.progress import simulated
 from smo_gym.evaluation import agents, figures, files, report, scenario, study, tables
 from smo_gym.evaluation.statistics import Result, results
 from smo_gym.validation import unknown
@@ -173,14 +174,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             files.prepare(out / "figures")
         print("\n".join([*left_out_agents, f"{runs} runs to do"]), file=sys.stderr, flush=True)
         try:
-            with tqdm(
-                total=study.simulated_seconds(groups),
-                unit="s",
-                unit_scale=True,
-                desc="simulated",
-                leave=False,
-                disable=None,
-            ) as bar:
+            with simulated(groups) as bar:
                 samples = figures.SAMPLES if drawn or args.report else None
                 outcomes = study.measure(groups, args.seed, bar.update, samples)
         except ValueError as error:  # an agent's force that is not finite, or its error

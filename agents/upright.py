@@ -17,12 +17,12 @@ from pathlib import Path
 
 from scipy import stats
 from tabulate import tabulate
-from tqdm import tqdm
 
 from smo_gym.cli.arguments import Parser, whole
 from smo_gym.cli.entry import command
+from smo_gym.cli.progress import simulated
 from smo_gym.evaluation import files, scenario, study
-from smo_gym.evaluation.formats import as_csv
+from smo_gym.evaluation.formats import as_csv, markdown
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "upright.yaml"
 RESULTS = ("falls.csv", "falls.md")
@@ -46,13 +46,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one = scenario.load(args.config)
     groups = [g for g in study.groups([one], list(one.controllers), list(ARMS), args.runs) if g.uncertainty > 0.0]
     with contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS) as out:
-        total = study.simulated_seconds(groups)
-        with tqdm(total=total, unit="s", unit_scale=True, desc="simulated", leave=False, disable=None) as bar:
+        with simulated(groups) as bar:
             outcomes = study.measure(groups, args.seed, bar.update)
         told = f"Falls in percent of {args.runs} random plants, with 95 % Wilson intervals:\n\n"
         try:
             if out is not None:
-                falls = told + table(outcomes, "github") + f"\n\nSeed {args.seed}, {args.config}\n"
+                falls = told + table(outcomes, "github") + f"\n\nSeed {args.seed}, {markdown(str(args.config))}\n"
                 files.write_set(out, dict(zip(RESULTS, (data(outcomes), falls), strict=True)))
         finally:  # what cannot be written can be read at least
             print(told + table(outcomes, "simple"))
