@@ -23,9 +23,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import smo_gym
+from smo_gym import files
 from smo_gym.cli.arguments import Parser, real, whole
 from smo_gym.cli.entry import command
-from smo_gym.evaluation import files, scenario
+from smo_gym.evaluation import scenario
 from smo_gym.validation import number, unknown
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "initial-conditions.yaml"

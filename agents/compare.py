@@ -21,11 +21,12 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from smo_gym import files
 from smo_gym.cli.arguments import Parser, positive, whole
 from smo_gym.cli.entry import command
 from smo_gym.cli.progress import simulated
-from smo_gym.evaluation import files, formats, scenario
-from smo_gym.learning import comparison
+from smo_gym.evaluation import formats, scenario
+from smo_gym.learning import contest
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "regulation.yaml"
 RESULTS = ("learning.csv", "runs.csv", "learning.md")
@@ -67,31 +68,31 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compare; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     args = parse(arguments)
-    from smo_gym.learning import aggregates, table
+    from smo_gym.learning import bootstrap, contest_table
 
     limit = scenario.Setting[float | None](value=args.force_limit, source="chosen", note="command line")
     place = scenario.load(args.config).model_copy(update={"force_limit": limit})
-    contenders, left_out = comparison.trained(args.folders, place.environment)
-    contenders += comparison.designed(place)
-    place = comparison.entered(place, contenders)
-    groups = [group for contender in contenders for group in comparison.groups(place, contender, args.runs)]
+    contenders, left_out = contest.trained(args.folders, place.environment)
+    contenders += contest.designed(place)
+    place = contest.entered(place, contenders)
+    groups = [group for contender in contenders for group in contest.groups(place, contender, args.runs)]
     with files.claimed(args.out, RESULTS) as out:
         for line in left_out:
             print(line, file=sys.stderr)
         with simulated(groups) as bar:
-            scores = comparison.measure(place, contenders, args.runs, args.seed, bar.update)
-        rows: list[table.Row] = []
+            scores = contest.measure(place, contenders, args.runs, args.seed, bar.update)
+        rows: list[contest_table.Row] = []
         answers: dict[str, list[str]] = {}
-        asked = table.questions(scores)
+        asked = contest_table.questions(scores)
         count = len(scores) + sum(len(pairs) for _, pairs in asked)
         with tqdm(total=count, unit="interval", leave=False, disable=None) as bar:
             for one in scores:
-                rows.append(table.Row(one, aggregates.interquartile_means(one)))
+                rows.append(contest_table.Row(one, bootstrap.interquartile_means(one)))
                 bar.update()
             for question, pairs in asked:
                 answers[question] = [] if pairs else ["open: there are no such runs"]
                 for a, b in pairs:
-                    answers[question].append(table.sentence(aggregates.compare(a, b)))
+                    answers[question].append(contest_table.sentence(bootstrap.compare(a, b)))
                     bar.update()
         levels = place.uncertainty.value
         told = (
@@ -102,14 +103,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "counts as the worst.\n"
         )
         texts = (
-            table.aggregate_csv(rows, levels),
-            table.runs_csv(rows, levels),
-            f"{told}\n{table.render(rows, levels, 'github')}\n{words(answers, 'github')}\n",
+            contest_table.aggregate_csv(rows, levels),
+            contest_table.runs_csv(rows, levels),
+            f"{told}\n{contest_table.render(rows, levels, 'github')}\n{words(answers, 'github')}\n",
         )
         try:
             files.write_set(out, dict(zip(RESULTS, texts, strict=True)))
         finally:  # what cannot be written can be read at least
-            print(table.render(rows, levels, "simple"))
+            print(contest_table.render(rows, levels, "simple"))
             print(words(answers, "simple"))
     print(f"\nresults are in {out}")
     return 0

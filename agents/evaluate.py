@@ -24,11 +24,14 @@ from pathlib import Path
 import yaml
 from tqdm import tqdm
 
+from smo_gym import files
 from smo_gym.cli.arguments import Parser, fraction, one_of, positive, several, versions, whole
 from smo_gym.cli.entry import Stop, command, said
 from smo_gym.cli.progress import simulated
-from smo_gym.evaluation import agents, figures, files, report, scenario, study, tables
+from smo_gym.evaluation import scenario, study
+from smo_gym.evaluation.report import figures, page, tables
 from smo_gym.evaluation.statistics import Result, results
+from smo_gym.policies import named
 from smo_gym.validation import unknown
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
@@ -127,11 +130,11 @@ def chosen(
     left_out: list[str] = []
     for text in dict.fromkeys(wanted):
         known = [name for name, law in laws.items() if text in (name, law, "all")]
-        if not known and not agents.named(text):
-            names = unknown("controller", text, {*laws, *laws.values(), agents.SHIPPED, "all"})
+        if not known and not named.named(text):
+            names = unknown("controller", text, {*laws, *laws.values(), named.SHIPPED, "all"})
             raise ValueError(f"{names}, PATH.safetensors, PATH.zip and module:Class")
         if not known:
-            scenarios, reasons = agents.entered(scenarios, text)
+            scenarios, reasons = scenario.entered(scenarios, text)
             left_out += reasons
         found += known or [text]
     return list(scenarios), list(dict.fromkeys(found)), left_out
@@ -158,7 +161,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     began = time.perf_counter()
     sys.path.append(os.getcwd())  # where an agent of one's own usually is
     for module in args.modules:
-        agents.imported(module)
+        named.imported(module)
     scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
     arms = chosen_arms(args.observer, args.compensation)
     groups = study.groups(scenarios, controllers, arms, args.runs)
@@ -167,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if args.report:
         if args.report.resolve() in ((args.out / name).resolve() for name in (*RESULTS, *drawings)):
             raise ValueError(f"--report {args.report}: is one of the results in --out {args.out}")
-        report.check(groups, args.report)
+        page.check(groups, args.report)
     runs = sum(group.runs for group in groups)
     with files.claimed(args.out, (*RESULTS, *drawings)) as out:
         if drawn:
@@ -191,7 +194,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             draw(out, drawn, outcomes, numbers)
             if args.report:
                 line = shlex.join(["python", "agents/evaluate.py", *given])
-                files.write(args.report, report.render(outcomes, numbers, line, versions()))
+                files.write(args.report, page.render(outcomes, numbers, line, versions()))
         except KeyboardInterrupt:
             raise Stop(f"interrupted while drawing; the tables are in {out}") from None
         except OSError as error:

@@ -27,11 +27,12 @@ from typing import Any
 from tabulate import tabulate
 from tqdm import tqdm
 
+from smo_gym import files
 from smo_gym.cli.arguments import Parser, whole
 from smo_gym.cli.entry import Stop, command
-from smo_gym.evaluation import files, scenario
-from smo_gym.evaluation.identification import Hypothesis, Problem, Search, cost, profile
-from smo_gym.evaluation.problems import Lqr, Regulation, Tracking
+from smo_gym.evaluation import scenario
+from smo_gym.evaluation.identify.search import Hypothesis, Problem, Search, cost, profile
+from smo_gym.evaluation.identify.unprinted import Lqr, Regulation, Tracking
 from smo_gym.validation import short
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"

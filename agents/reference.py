@@ -19,9 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+from smo_gym import files
 from smo_gym.cli.arguments import Parser, real, whole
 from smo_gym.cli.entry import command
-from smo_gym.evaluation import files, scenario
+from smo_gym.evaluation import scenario
 from smo_gym.reference import ReferenceNotFound, minimum_energy
 from smo_gym.validation import multiple
 

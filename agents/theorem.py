@@ -27,13 +27,21 @@ from scipy import stats
 from tabulate import tabulate
 from tqdm import tqdm
 
-from smo_gym import CartPendulum, Gains, SlidingModeController, SlidingModeObserver, VectorObserverWrapper, theorem
+from smo_gym import (
+    CartPendulum,
+    Gains,
+    SlidingModeController,
+    SlidingModeObserver,
+    VectorObserverWrapper,
+    files,
+    theorem,
+)
 from smo_gym.cli.arguments import Parser, whole
 from smo_gym.cli.entry import command
-from smo_gym.evaluation import files, rollout, scenario
-from smo_gym.evaluation.convergence import SHARES, Convergence, converge
+from smo_gym.evaluation import rollout, scenario
 from smo_gym.evaluation.rollout import Traces
 from smo_gym.evaluation.scenario import Scenario, TheoremSettings
+from smo_gym.evaluation.theorem_on_runs import SHARES, Convergence, converge
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 DT = 0.001

@@ -23,10 +23,10 @@ from pathlib import Path
 from tabulate import tabulate
 from tqdm import tqdm
 
+from smo_gym import files
 from smo_gym.cli.arguments import Parser, fraction, versions, whole
 from smo_gym.cli.entry import Stop, command
-from smo_gym.evaluation import files
-from smo_gym.learning.observations import KINDS
+from smo_gym.wrappers.view import KINDS
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 DEFAULTS = {"ppo": CONFIGS / "ppo.yaml", "recurrent": CONFIGS / "ppo_lstm.yaml"}

@@ -18,10 +18,11 @@ from pathlib import Path
 from scipy import stats
 from tabulate import tabulate
 
+from smo_gym import files
 from smo_gym.cli.arguments import Parser, whole
 from smo_gym.cli.entry import command
 from smo_gym.cli.progress import simulated
-from smo_gym.evaluation import files, scenario, study
+from smo_gym.evaluation import scenario, study
 from smo_gym.evaluation.formats import as_csv, markdown
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "upright.yaml"

@@ -18,8 +18,8 @@ from stable_baselines3.common.vec_env import VecEnv
 from tabulate import tabulate
 
 import smo_gym
-from smo_gym.learning.observations import VectorAgentView
 from smo_gym.learning.sb3 import SB3VecEnv
+from smo_gym.wrappers.view import VectorAgentView
 
 
 class Costless(SB3VecEnv):

@@ -6,16 +6,16 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .kernels import kernel, plain
 from .kernels.batch import LANES, for_slots, load, store
 from .kernels.cart_pendulum import drift_and_gain, energy
 from .kernels.cart_pendulum import plant as _plant
 from .kernels.rk4 import rk4
+from .typing import Array
 from .validation import array, mapping, number, short
 
-Array = NDArray[np.float64]
 STATE_NAMES = ("h", "theta", "h_dot", "theta_dot")
 _MICROSECONDS_A_STEP = 0.015  # of one slot: decides when a second thread is worth waking
 

@@ -14,14 +14,14 @@ from importlib import resources
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .kernels import plain
 from .kernels.cart_pendulum import control_affine, energy
 from .plant import CartPendulum, advance
+from .typing import Array
 from .validation import array, multiple, number, unknown, whole
 
-Array = NDArray[np.float64]
 _DEGREE = 4  # Radau points in a finite element
 _LONGEST = 0.05  # s; an element of the force is divided into finite elements no longer than this
 

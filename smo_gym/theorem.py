@@ -11,14 +11,13 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from .controllers import SlidingModeController
 from .observers import Gains, SlidingModeObserver
 from .plant import CartPendulum
+from .typing import Array, Flags
 from .validation import array, number
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +49,7 @@ class OperatingSet:
         if not 0.0 <= number("uncertainty", self.uncertainty) < 1.0:
             raise ValueError(f"uncertainty={self.uncertainty!r} must be a fraction in [0, 1)")
 
-    def holds(self, x: Array, xhat: Array) -> NDArray[np.bool_]:
+    def holds(self, x: Array, xhat: Array) -> Flags:
         """Which pairs of states (4, ...) and estimates (4, ...) are inside, (...)."""
         speed, speed_hat = (np.reshape(bound, (2, *[1] * (x.ndim - 1))) for bound in (self.speed, self.speed_hat))
         angles = (np.abs(x[1]) <= self.theta) & (np.abs(xhat[1]) <= self.theta)
@@ -138,7 +137,7 @@ class Condition:
     supremum: Array
 
     @property
-    def by_row(self) -> NDArray[np.bool_]:
+    def by_row(self) -> Flags:
         """Whether each row's own gain exceeds its own supremum."""
         return np.asarray(self.gain > self.supremum)
 

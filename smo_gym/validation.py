@@ -8,7 +8,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from .typing import Array
 
 MOST = 1e8
 """Integration steps in a control period, control periods in an episode: more is a slip, not a simulation."""
@@ -74,7 +76,7 @@ def mapping(what: str, value: Any, known: Iterable[str]) -> dict[str, Any]:
     return dict(value)
 
 
-def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     """A finite float64 array of the given shape (a copy).
 
     Raises:
@@ -110,7 +112,7 @@ def shape_of(value: Any) -> tuple[int, ...] | None:
         return None
 
 
-def observed(observation: Any) -> NDArray[np.float64]:
+def observed(observation: Any) -> Array:
     """An observation, or several as rows, as an array of floats.
 
     Raises:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from smo_gym import LQR, CartPendulum, Gains, SlidingModeController, SlidingModeObserver, theorem
-from smo_gym.evaluation.convergence import converge
+from smo_gym.evaluation.theorem_on_runs import converge
 from smo_gym.theorem import OperatingSet
 
 SET = OperatingSet(theta=0.7, speed=(1.7, 5.2), speed_hat=(6.0, 6.0), uncertainty=0.2)

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from smo_gym.evaluation import files, scenario, study
+from smo_gym import files
+from smo_gym.evaluation import scenario, study
 
 ROOT = Path(__file__).resolve().parent.parent
 REGULATION = f"extends: {ROOT}/configs/regulation.yaml\n"

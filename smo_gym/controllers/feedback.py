@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..envs.task import Task
 from ..plant import CartPendulum
+from ..typing import Array
 from ..validation import array, number, observed, shape_of, short
-
-Array = NDArray[np.float64]
 
 
 def estimated_error(observation: ArrayLike, wrap: bool) -> Array:
@@ -48,8 +46,8 @@ def nominal(model: Any) -> CartPendulum:
         ValueError: it is none of these.
     """
     task = getattr(getattr(model, "unwrapped", None), "task", None)
-    if isinstance(task, Task):
-        return task.params
+    if isinstance(params := getattr(task, "params", None), CartPendulum):
+        return params
     if isinstance(model, str) or not isinstance(model, CartPendulum | Mapping | Sequence | np.ndarray | None):
         raise ValueError(f"model={short(model)} must be a CartPendulum or a smo_gym environment")
     return CartPendulum.of(model, name="model")

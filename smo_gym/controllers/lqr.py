@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 from numpy.linalg import LinAlgError
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import solve_continuous_are
 
+from ..typing import Array, Flags
 from ..validation import array, shape_of, short, switch
 from .feedback import estimated_error, nominal, weights
 
-Array = NDArray[np.float64]
 _SLOWEST = 1e-6  # of the fastest pole's size: nearer to the axis a pole is on it, but for rounding
 
 
@@ -69,7 +69,7 @@ class LQR:
         self,
         observation: Array,
         state: tuple[Array, ...] | None = None,
-        episode_start: NDArray[np.bool_] | None = None,
+        episode_start: Flags | None = None,
         deterministic: bool = False,
     ) -> tuple[Array, tuple[Array, ...] | None]:
         """The force in N, shape (n, 1) for observations (n, observation) and (1,) for one; the law has no state.

@@ -3,15 +3,14 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..article import SMC_GAINS
 from ..kernels import kernel
 from ..kernels.elementary import sincos, tanh
+from ..typing import Array, Flags
 from ..validation import array, number, shape_of, short, switch
 from .feedback import estimated_error
-
-Array = NDArray[np.float64]
 
 
 class SlidingModeController:
@@ -74,7 +73,7 @@ class SlidingModeController:
         self,
         observation: Array,
         state: tuple[Array, ...] | None = None,
-        episode_start: NDArray[np.bool_] | None = None,
+        episode_start: Flags | None = None,
         deterministic: bool = False,
     ) -> tuple[Array, tuple[Array, ...] | None]:
         """The force in N and the integral after it.

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..reference import Reference
 from ..validation import multiple
 from .task import Task
-
-Array = NDArray[np.float64]
 
 
 class Desired:

@@ -8,15 +8,14 @@ import gymnasium
 import numpy as np
 from gymnasium import logger
 from gymnasium.error import ResetNeeded
-from numpy.typing import NDArray
 
+from ..typing import Array
 from ..validation import mapping, short
 from .desired import Desired
 from .rendering import MODES, Renderer, Scene
 from .spec import Specified
 from .task import HANGING, TRACKING, UPRIGHT, Stepper, Task, applied_force
 
-Array = NDArray[np.float64]
 RESET_OPTIONS = ("state", "params")
 _REST = np.zeros((1, 4))
 

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..typing import Array
 from .task import Task
 
 if TYPE_CHECKING:
     import pygame
 
-Array = NDArray[np.float64]
 Point = tuple[float, float]
 
 MODES = ["human", "rgb_array"]

@@ -10,15 +10,14 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..kernels import kernel
 from ..plant import CartPendulum, advance
 from ..reference import Reference, shipped
+from ..typing import Array, Flags
 from ..validation import array, limit, mapping, multiple, number, shape_of, short, unknown, whole
 
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 _FURTHEST = 10_000  # control instants of a preview: an observation holds four numbers of each
 
 

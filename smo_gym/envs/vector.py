@@ -15,15 +15,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from ..typing import Array, Flags
 from ..validation import mapping, short, whole
 from .desired import Desired
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .rendering import Renderer, Scene
 from .spec import Specified
 from .task import Stepper, Task, applied_force
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..kernels import kernel
 from ..plant import STATE_NAMES
-
-Array = NDArray[np.float64]
+from ..typing import Array, Flags
 
 NAMES = (
     "mse_h",  # mean of (h - h_d)^2 over the sampling instants, m^2; h_d = 0 without a reference
@@ -34,7 +32,7 @@ def start(n: int) -> Array:
     return np.zeros((19, n))
 
 
-def add(sums: Array, info: dict[str, Any], xhat: Array, over: NDArray[np.bool_]) -> None:
+def add(sums: Array, info: dict[str, Any], xhat: Array, over: Flags) -> None:
     """Add one control period, which ended with the estimates ``xhat`` (n, 4), to all runs that are not over yet."""
     deviation = info["samples"] - info["desired"] if "desired" in info else info["samples"]
     _add(sums, deviation, info["state"], xhat, info["force"], over)
@@ -54,7 +52,7 @@ def finish(sums: Array, control_period: float) -> dict[str, Array]:
 
 
 @kernel
-def _add(sums: Array, deviation: Array, x: Array, xhat: Array, u: Array, over: NDArray[np.bool_]) -> None:
+def _add(sums: Array, deviation: Array, x: Array, xhat: Array, u: Array, over: Flags) -> None:
     for i in range(len(u)):
         if over[i]:
             continue

@@ -8,8 +8,8 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from .. import files
 from ..validation import unknown
-from . import files
 
 T = TypeVar("T", bound=BaseModel)
 MOST_FILES = 16

@@ -4,38 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
-from numpy.typing import NDArray
 
+from ..controllers import Agent, title
 from ..envs.desired import Desired
 from ..envs.task import Task
+from ..typing import Array, Flags
 from . import metrics
 
-Array = NDArray[np.float64]
 # An observer of poor gains can diverge while its plant goes on. No estimate in m, rad, m/s, rad/s comes near this.
 DIVERGED = 1e4
-
-
-class Agent(Protocol):
-    """Anything with Stable-Baselines3's ``predict``, on batches: LQR, SMC, a learned policy, your own."""
-
-    def predict(
-        self,
-        observation: Array,
-        state: tuple[Array, ...] | None = None,
-        episode_start: NDArray[np.bool_] | None = None,
-        deterministic: bool = False,
-    ) -> tuple[Array, tuple[Array, ...] | None]:
-        """Actions (n, action) for observations (n, observation), and the agent's own state for the next call."""
-        ...
-
-
-def title(agent: Agent) -> str:
-    """An agent in messages, ``module:Class``."""
-    return f"{type(agent).__module__}:{type(agent).__qualname__}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +47,7 @@ class Rollout:
 
     metrics: dict[str, Array]
     """Metric name (:data:`smo_gym.evaluation.metrics.NAMES`) to values (n,), over each run's own duration."""
-    failed: NDArray[np.bool_]
+    failed: Flags
     """Runs that terminated (off the track, fallen, not finite) or whose estimate diverged or was lost, (n,)."""
     traces: Traces | None
 
@@ -114,7 +95,7 @@ def rollout(
 
     trace = _Recorder(trace_every, trace_slots, task)
     trace.record(0, info, estimate())
-    failed: NDArray[np.bool_] = np.zeros(n, dtype=np.bool_)
+    failed: Flags = np.zeros(n, dtype=np.bool_)
     first, agent_state = np.ones(n, dtype=np.bool_), None
     later = ~first
     failures = 0

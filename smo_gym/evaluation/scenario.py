@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,13 +12,14 @@ import gymnasium
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from .. import files
+from ..controllers import Agent, title
 from ..envs.task import Task, applied_force
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
 from ..validation import number
 from ..wrappers import VectorObserverWrapper
-from . import files, reading
+from . import reading
 from .formats import is_number, line
-from .rollout import Agent, title
 from .settings import (
     LONGEST_PERIOD,
     ControllerSettings,
@@ -36,7 +37,7 @@ from .settings import (
     TheoremSettings,
 )
 
-__all__ = ["ControllerSettings", "Scenario", "Setting", "TheoremSettings", "load", "load_theorem"]
+__all__ = ["ControllerSettings", "Scenario", "Setting", "TheoremSettings", "entered", "load", "load_theorem"]
 
 
 class Scenario(Strict):
@@ -131,7 +132,7 @@ class Scenario(Strict):
         """The same with one controller more, on the estimates of LQR's observer (or the first controller's).
 
         Args:
-            name: any for :func:`smo_gym.evaluation.agents.load`, also those that a file may not name.
+            name: any for :func:`smo_gym.policies.named.load`, also those that a file may not name.
 
         Raises:
             ValueError: there is no such agent, or it cannot act here.
@@ -143,6 +144,28 @@ class Scenario(Strict):
         more = self.model_copy(update={"controllers": {**self.controllers, name: settings}})
         _try_controller(more, name)
         return more
+
+
+def entered(scenarios: Sequence[Scenario], agent: str) -> tuple[list[Scenario], list[str]]:
+    """The scenarios with an agent where it can act, and a line for each other.
+
+    Raises:
+        ValueError: it can act in none.
+        ImportError: an extra is missing.
+    """
+    reasons: dict[str, str] = {}
+
+    def enter(one: Scenario) -> Scenario:
+        try:
+            return one.with_agent(agent)
+        except ValueError as error:
+            reasons[one.title] = str(error)
+            return one
+
+    more = [enter(one) for one in scenarios]
+    if len(reasons) == len(scenarios):
+        raise ValueError("; ".join(dict.fromkeys(reasons.values())))
+    return more, [f"left out of {title}: {reason}" for title, reason in reasons.items()]
 
 
 def load_theorem(path: Path) -> TheoremSettings:

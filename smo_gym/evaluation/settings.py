@@ -7,12 +7,11 @@ from typing import Annotated, Any, Generic, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
-from ..controllers import LQR, SlidingModeController
+from ..controllers import LQR, Agent, SlidingModeController
 from ..observers import Gains, SlidingModeObserver
 from ..plant import CartPendulum
+from ..policies import named
 from ..theorem import OperatingSet, design, stable
-from . import agents
-from .rollout import Agent
 
 T = TypeVar("T")
 Four = tuple[float, float, float, float]
@@ -116,7 +115,7 @@ class SmcSettings(Strict):
 
 
 class PolicySettings(Strict):
-    """An agent by its name for :func:`smo_gym.evaluation.agents.load`: of those names, one that runs no code."""
+    """An agent by its name for :func:`smo_gym.policies.named.load`: of those names, one that runs no code."""
 
     law: Literal["policy"]
     agent: str
@@ -125,16 +124,16 @@ class PolicySettings(Strict):
     @field_validator("agent")
     @classmethod
     def _data(cls, name: str) -> str:
-        if not agents.is_data(name):
+        if not named.is_data(name):
             raise ValueError(
-                f"a file may name {agents.SHIPPED} or PATH.safetensors alone; what runs code is named on the command "
+                f"a file may name {named.SHIPPED} or PATH.safetensors alone; what runs code is named on the command "
                 "line, as --controller PATH.zip or module:Class"
             )
         return name
 
     def build(self, environment: str) -> Agent:
         """The agent for an environment, made anew."""
-        return agents.load(self.agent, environment)
+        return named.load(self.agent, environment)
 
 
 ControllerSettings = Annotated[LqrSettings | SmcSettings | PolicySettings, Field(discriminator="law")]

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import stats
 
 from ..article import Cell, published
+from ..typing import Array, Flags
 from .study import ARMS, Outcome
 from .verdicts import PRINTED_RUNS, ceiling
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +121,7 @@ def _cells(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> 
     return [mse, rms]
 
 
-def _runs(rows: Sequence[Outcome], state: str) -> tuple[Array, NDArray[np.bool_]]:
+def _runs(rows: Sequence[Outcome], state: str) -> tuple[Array, Flags]:
     """MSE of each run, averaged over rows, and which runs failed in none of them."""
     values = np.mean([np.where(row.failed, np.nan, row.metrics[f"mse_{state}"]) for row in rows], axis=0)
     return values, np.isfinite(values)

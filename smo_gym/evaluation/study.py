@@ -10,16 +10,15 @@ from typing import Any
 import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
-from numpy.typing import NDArray
 
 from ..envs.task import Task
 from ..plant import STATE_NAMES, CartPendulum
+from ..typing import Array, Flags
 from ..validation import choice
 from ..wrappers import VectorObserverWrapper
 from .rollout import Traces, rollout
 from .scenario import ControllerSettings, Scenario
 
-Array = NDArray[np.float64]
 ARMS = ("without", "with", "theorem", "oracle")
 """Compensation of the input uncertainty off, on; gains designed for the theorem; the true state for an estimate."""
 TRACED_RUNS = 10
@@ -61,7 +60,7 @@ class Outcome:
     group: Group
     metrics: dict[str, Array]
     """Metric name to values (runs,)."""
-    failed: NDArray[np.bool_]
+    failed: Flags
     """(runs,)."""
     traces: Traces | None = None
     """Of its first :data:`TRACED_RUNS` runs, where :func:`measure` was asked for them."""
@@ -69,7 +68,7 @@ class Outcome:
     """[M_c, m, l, g] of these runs, (runs, 4)."""
 
     @property
-    def left(self) -> NDArray[np.bool_] | None:
+    def left(self) -> Flags | None:
         """Which runs left the operating set that the theorem's gains are designed for, (runs,); None in other arms."""
         designed = self.group.scenario.designed
         if self.group.arm != "theorem" or designed is None:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..typing import Array
 from .study import Outcome
 
-Array = NDArray[np.float64]
 PRINTED_RUNS = 10
 """A cell of the article is a mean of so many runs."""
 _RESAMPLES = 2000

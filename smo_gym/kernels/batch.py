@@ -11,9 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from ..typing import Array
 from ..validation import whole
 from . import inlined
 
@@ -23,7 +21,7 @@ _WORTH_A_THREAD = 500.0
 
 
 @inlined
-def load(work: NDArray[np.float64], row: int, rows: NDArray[np.float64], first: int, lanes: int) -> None:
+def load(work: Array, row: int, rows: Array, first: int, lanes: int) -> None:
     """Copy ``lanes`` slots from slot ``first`` on of a (rows, n) array into the workspace's rows from ``row`` on."""
     for r in range(rows.shape[0]):
         target, source = work[(row + r) * LANES :], rows[r, first:]
@@ -32,7 +30,7 @@ def load(work: NDArray[np.float64], row: int, rows: NDArray[np.float64], first: 
 
 
 @inlined
-def store(work: NDArray[np.float64], row: int, rows: NDArray[np.float64], first: int, lanes: int) -> None:
+def store(work: Array, row: int, rows: Array, first: int, lanes: int) -> None:
     """Copy the workspace's rows back into a (rows, n) array, the reverse of :func:`load`."""
     for r in range(rows.shape[0]):
         source, target = work[(row + r) * LANES :], rows[r, first:]

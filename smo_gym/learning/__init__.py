@@ -1,22 +1,5 @@
-"""Learning on estimated state.
+"""Learning on estimated state, and the contest of what was learned with what was designed.
 
-``observations.py`` says what an agent sees, ``sb3.py`` puts the vector environments into Stable-Baselines3,
-``policy.py`` runs what was learned without it. Only ``sb3.py`` and ``training.py`` need the extra ``rl``.
+``settings.py`` says what a training is, ``sb3.py`` puts the vector environments into Stable-Baselines3, ``training.py``
+trains. Only these two need the extra ``rl``.
 """
-
-from pathlib import Path
-
-from ..validation import choice
-from .policy import MlpPolicy
-
-BASELINES = {"SMOPendulum-v0": "pendulum", "SMOPendulumUpright-v0": "upright"}
-
-
-def shipped(environment: str) -> MlpPolicy:
-    """The policy on SMO estimates that comes with the package, as ``python agents/train.py`` trains it.
-
-    Raises:
-        ValueError: there is none for that environment.
-    """
-    name = BASELINES[choice("environment with a shipped policy", environment, BASELINES)]
-    return MlpPolicy.load(Path(__file__).parent / "baselines" / f"{name}.safetensors")

@@ -7,9 +7,9 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from ..evaluation.rollout import rollout
+from ..policies.frozen import MlpPolicy
 from ..wrappers import VectorObserverWrapper
-from .observations import KINDS
-from .policy import MlpPolicy
+from ..wrappers.view import KINDS
 
 TRAINING, VALIDATION, TEST = range(3)
 """Streams of seeds: what a policy learns on, is watched on while it learns, and is measured on at the end."""

@@ -9,6 +9,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from numpy.typing import NDArray
 
+from ..typing import Array, Flags
+
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
@@ -25,7 +27,7 @@ class SB3VecEnv(VecEnv):
     ``TimeLimit.truncated``. The whole last info of the batch is in ``vector_info``.
 
     Args:
-        env: a vector environment, such as :class:`~smo_gym.learning.observations.VectorAgentView`, with
+        env: a vector environment, such as :class:`~smo_gym.wrappers.view.VectorAgentView`, with
             ``autoreset_mode=SAME_STEP``, the way of Stable-Baselines3.
 
     Raises:
@@ -50,7 +52,7 @@ class SB3VecEnv(VecEnv):
         """Keep the actions for :meth:`step_wait`."""
         self._actions = actions
 
-    def step_wait(self) -> tuple[NDArray[Any], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[NDArray[Any], NDArray[np.float32], Flags, list[dict[str, Any]]]:
         """Step all slots."""
         observation, reward, terminated, truncated, info = self.env.step(self._actions)
         done = np.logical_or(terminated, truncated)
@@ -131,7 +133,7 @@ def _together(each: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
     return together
 
 
-def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def layers(policy: Any) -> list[tuple[Array, Array]]:
     """Weights and biases, inputs first, of an actor whose hidden layers are dense with tanh.
 
     Raises:
@@ -146,7 +148,7 @@ def layers(policy: Any) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]
     return [(_array(layer.weight), _array(layer.bias)) for layer in dense]
 
 
-def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
+def lstm_weights(lstm: Any) -> tuple[Array, ...]:
     """Weights and biases of a single LSTM layer: of its inputs, of its own output.
 
     Raises:
@@ -158,5 +160,5 @@ def lstm_weights(lstm: Any) -> tuple[NDArray[np.float64], ...]:
     return tuple(_array(part) for part in parts)
 
 
-def _array(parameter: Any) -> NDArray[np.float64]:
+def _array(parameter: Any) -> Array:
     return parameter.detach().numpy().astype(np.float64)  # type: ignore[no-any-return]

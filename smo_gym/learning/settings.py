@@ -12,11 +12,11 @@ from typing import Any
 import gymnasium
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from .. import files
 from ..envs.task import plain_data
-from ..evaluation import files
 from ..validation import choice, mapping, number, whole
+from ..wrappers.view import KINDS, VectorAgentView
 from .measurement import TRAINING, seeds
-from .observations import KINDS, VectorAgentView
 from .sb3 import SB3VecEnv
 
 try:
@@ -27,7 +27,7 @@ except ImportError as error:
     raise ImportError('training needs Stable-Baselines3 and sb3-contrib: pip install "smo_gym[rl]"') from error
 
 ALGORITHMS: dict[str, type[Any]] = {"ppo": PPO, "recurrent": RecurrentPPO}
-VIEW = "smo_gym.learning.observations.agent_view"
+VIEW = "smo_gym.wrappers.view.agent_view"
 OURS = {"self", "env", "seed", "device", "tensorboard_log", "_init_setup_model"}
 """Arguments of an algorithm that are no hyperparameters."""
 WHOLE = ("n_steps", "batch_size", "n_epochs")

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from ..evaluation import files
+from .. import files
+from ..policies.frozen import Card, LstmPolicy, MlpPolicy
 from ..validation import short, whole
+from ..wrappers.view import KINDS, units
 from .measurement import TRAINING, VALIDATION, measure, seeds
-from .observations import KINDS, units
-from .policy import Card, LstmPolicy, MlpPolicy
 from .sb3 import SB3VecEnv, layers, lstm_weights
 from .settings import Run, learner, make
 

@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..plant import CartPendulum
+from ..typing import Array, Flags
 from .protocol import Period
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +26,7 @@ class _Truth:
     def xhat(self) -> Array:
         return self._x.copy()
 
-    def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:
+    def reset(self, slots: Flags, truth: Array) -> None:
         self._x[:, slots] = truth[:, slots]
 
     def update(self, period: Period) -> None:

@@ -2,12 +2,8 @@
 
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..plant import CartPendulum
-
-Array = NDArray[np.float64]
+from ..typing import Array, Flags
 
 
 class Period(NamedTuple):
@@ -31,7 +27,7 @@ class Estimator(Protocol):
         """The estimates [h, theta, h', theta'], (4, n), a copy."""
         ...
 
-    def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:
+    def reset(self, slots: Flags, truth: Array) -> None:
         """Start the marked slots, (n,), anew. Only an oracle reads the plants' states ``truth``, (4, n)."""
         ...
 

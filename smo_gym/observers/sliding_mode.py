@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..article import OBSERVER_GAINS
 from ..kernels import inlined, kernel
@@ -19,10 +19,10 @@ from ..kernels.cart_pendulum import drift_and_gain
 from ..kernels.elementary import tanh
 from ..kernels.rk4 import rk4
 from ..plant import CartPendulum
+from ..typing import Array, Flags
 from ..validation import array, choice, mapping, multiple, number, shape_of, short, switch
 from .protocol import Period
 
-Array = NDArray[np.float64]
 _MICROSECONDS_A_STEP = 0.035
 # tanh(k e) with a slope this steep is sgn(e) for every e that is not 0, and 0 for e = 0.
 _EXACT = 1e300
@@ -219,7 +219,7 @@ class _Bank:
     def xhat(self) -> Array:
         return self._state[:4].copy()
 
-    def reset(self, slots: NDArray[np.bool_], truth: Array) -> None:
+    def reset(self, slots: Flags, truth: Array) -> None:
         self._state[:, slots] = self._initial[:, slots]
 
     def update(self, period: Period) -> None:

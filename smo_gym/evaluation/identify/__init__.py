@@ -1,0 +1,1 @@
+"""What the article does not print, recovered from what it does."""

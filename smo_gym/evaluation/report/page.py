@@ -1,0 +1,204 @@
+"""Results as one HTML file that needs no network: tables, plots, and runs that play.
+
+Template, style and scripts are in ``assets/``. What comes from a user (names, titles, notes) is escaped by the
+template; the scripts set it as text only.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import zlib
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ... import files
+from .. import formats
+from ..statistics import Result, place
+from ..study import ARMS, Group, Outcome
+from . import page_figures, tables
+from .page_traces import CHANNELS, LEVELS, pack, runs_that_fit
+from .panels import WINDOW
+from .provenance import sources
+
+_SCRIPTS = ("data.js", "cart.js", "curves.js", "tables.js", "page.js")
+
+
+def check(groups: Sequence[Group], path: Path) -> None:
+    """See that a report of some groups can be made and written to a file; before any run.
+
+    Raises:
+        ImportError: Plotly or Jinja is missing.
+        ValueError: there are no runs to draw, or the file is a folder or in one that cannot be written to.
+    """
+    try:
+        import jinja2  # noqa: F401
+        import plotly  # noqa: F401
+    except ImportError as error:
+        raise ImportError(f'a report needs {error.name}: pip install "smo_gym[report]"') from None
+    if not groups:
+        raise ValueError("no runs to draw: no scenario has such a controller")
+    if path.is_dir():
+        raise ValueError(f"--report {path}: is a folder, it must be a file such as {path / 'report.html'}")
+    files.prepare(path.parent, "--report")
+
+
+def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str, versions: Mapping[str, str]) -> str:
+    """The page.
+
+    Args:
+        outcomes: of :func:`smo_gym.evaluation.study.measure`, with traces.
+        results: of :func:`smo_gym.evaluation.statistics.results`.
+        command: the command line that made them.
+        versions: of what took part, by name.
+    """
+    import jinja2
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("smo_gym.evaluation.report", "assets"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = resources.files(__package__) / "assets"
+    runs = runs_that_fit(outcomes)
+    places, packed = pack(outcomes, runs)
+    groups = [_group(outcome, where) for outcome, where in zip(outcomes, places, strict=True)]
+    header, diagnosed = tables.diagnosed(outcomes)
+    settings = sources(outcomes)
+    figures = {
+        "curves": page_figures.curves(),
+        "scatter": page_figures.scatter(results),
+        "bars": page_figures.bars(results),
+    }
+    page_text = environment.get_template("page.html").render(
+        style=Markup((page / "page.css").read_text(encoding="utf-8")),
+        scripts=Markup("\n".join((page / name).read_text(encoding="utf-8") for name in _SCRIPTS)),
+        plotly=base64.b64encode(zlib.compress(get_plotlyjs().encode(), 9)).decode("ascii"),
+        packed=packed,
+        data={
+            "channels": CHANNELS,
+            "levels": LEVELS.tolist(),
+            "colours": {
+                arm: [colour, page_figures.COLOURS_ON_DARK[arm]] for arm, colour in page_figures.COLOURS.items()
+            },
+            "arms": page_figures.ARM_NAMES,
+            "groups": groups,
+        },
+        figures=Markup(_json(figures)),
+        summary=tables.summary(results),
+        runs=sum(len(outcome.failed) for outcome in outcomes),
+        failed=sum(int(outcome.failed.sum()) for outcome in outcomes),
+        shown=runs,
+        most=max(len(outcome.failed) for outcome in outcomes),
+        tables=_tables(outcomes, results),
+        bars=list(figures["bars"]),
+        arms={arm: page_figures.ARM_NAMES[arm] for arm in ARMS if any(o.group.arm == arm for o in outcomes)},
+        rms=any(r.cell.metric == "rms" for r in results),
+        header=header,
+        diagnosed=diagnosed,
+        settings=settings,
+        sources=Counter(row["source"] for row in settings),
+        window=WINDOW,
+        command=command,
+        versions=versions,
+    )
+    return page_text.encode("utf-8", "replace").decode("utf-8")  # a path need not be text
+
+
+def _json(figures: Mapping[str, Any]) -> str:
+    """Figures as JSON that a script element can hold."""
+
+    def text(figure: Any) -> str:
+        if isinstance(figure, dict):
+            return "{" + ",".join(f"{json.dumps(name)}:{text(one)}" for name, one in figure.items()) + "}"
+        return "null" if figure is None else str(figure.to_json())
+
+    return text(figures).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
+    """What the page must know of a group to name, find, unpack and draw its runs."""
+    group, traces, metrics = outcome.group, outcome.traces, outcome.metrics
+    shown = slice(where["runs"])
+    assert traces is not None
+    assert outcome.plants is not None
+    return {
+        **where,
+        "table": formats.line(group.scenario.table),
+        "title": formats.line(group.scenario.title),
+        "controller": formats.line(group.name),
+        "name": tables.title(group.name),
+        "uncertainty": f"{100 * group.uncertainty:.10g} %",
+        "case": formats.line(group.case),
+        "start": [float(value) for value in group.scenario.initial_states.value[group.case]],
+        "arm": group.arm,
+        "period": float(traces.time[1]) if len(traces.time) > 1 else 1.0,
+        "failed": outcome.failed[shown].tolist(),
+        "duration": [round(float(value), 6) for value in metrics["duration"][shown]],
+        "plants": [[float(f"{value:.4g}") for value in plant] for plant in outcome.plants[shown]],
+        **{name: [page_figures.short(value) for value in metrics[name][shown]] for name in ("mse_h", "mse_theta")},
+    }
+
+
+def _tables(outcomes: Sequence[Outcome], results: Iterable[Result]) -> list[dict[str, Any]]:
+    """Each controller's tables as rows of text, with where each number lies beside the published one."""
+    indices = {
+        (o.group.scenario.table, o.group.name, *place(o), o.group.arm): index for index, o in enumerate(outcomes)
+    }
+    titles = {(o.group.scenario.table, o.group.name): o.group.scenario.title for o in outcomes}
+    found = []
+    for (table, name), rows in tables.by_table(results).items():
+        cells = [r for r in rows if r.cell.metric in ("mse", "rms")]
+        found.append(
+            {
+                "table": formats.line(table),
+                "controller": formats.line(name),
+                "name": tables.title(name),
+                "title": titles[table, name],
+                "verdict": tables.verdict(rows),
+                "rows": [
+                    {
+                        "cell": r.cell,
+                        "text": tables.cell_row(r),
+                        "mark": _mark(r),
+                        "group": indices.get(
+                            (table, name, r.cell.uncertainty_percent, r.cell.case, r.cell.compensation)
+                        ),
+                    }
+                    for r in cells
+                ],
+                "reductions": [
+                    {"cell": r.cell, "text": tables.reduction_row(r)} for r in rows if r.cell.metric == tables.REDUCTION
+                ],
+            }
+        )
+    return found
+
+
+def _mark(result: Result) -> dict[str, float | str] | None:
+    """The ratio and its interval on a logarithmic axis from a half (0) to double (100), and how far off it is."""
+    if not math.isfinite(result.deviation):
+        return None
+
+    def position(value: float) -> float:
+        ratio = value / result.published if value > 0.0 else 0.0
+        return round(50.0 + 50.0 * min(max(math.log2(ratio), -1.0), 1.0), 1) if ratio > 0.0 else 0.0
+
+    off = math.exp(result.deviation) - 1.0
+    level = next(level for level, limit in enumerate((0.1, 0.25, 0.5, math.inf)) if abs(off) <= limit)
+    ends = [v if math.isfinite(v) else result.measured for v in (result.ci_low, result.ci_high)]
+    return {
+        "low": position(ends[0]),
+        "middle": position(result.measured),
+        "high": position(ends[1]),
+        "look": "near" if level == 0 else f"{'above' if off > 0.0 else 'below'}-{level}",
+        "sign": "" if level == 0 else "▲" if off > 0.0 else "▼",
+    }
