@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .kernels import kernel, plain
-from .kernels.batch import LANES, for_slots, load, store
+from .kernels.batch import LANES
+from .kernels.blocks import ALIVE, FAILED, U, X, at, block, finite, four, offsets, put, put_four
 from .kernels.cart_pendulum import drift_and_gain, energy
 from .kernels.cart_pendulum import plant as _plant
 from .kernels.rk4 import rk4
+from .loop import Loop, Part, columns
 from .typing import Array
 from .validation import array, mapping, number, short
 
 STATE_NAMES = ("h", "theta", "h_dot", "theta_dot")
-_MICROSECONDS_A_STEP = 0.015  # of one slot: decides when a second thread is worth waking
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,45 +152,45 @@ def _states(x: ArrayLike) -> Array:
     return states
 
 
+PARAMS, DT, _ = offsets(4, 1)
+
+
+@block
+def _step(signals: Array, own: Array, lanes: int) -> None:
+    dt = own[DT * LANES]
+    for i in range(lanes):
+        x = four(signals, X, i)
+        M_c, m, l, g = four(own, PARAMS, i)
+        new = rk4(_plant, x, (at(signals, U, i), M_c, m, l, g), dt)
+        alive, fine = at(signals, ALIVE, i) > 0.0, finite(new)
+        put(signals, FAILED, i, 1.0 if alive and not fine else at(signals, FAILED, i))
+        put_four(signals, X, i, new if alive and fine else x)
+
+
+def moving(params: Array, dt: float) -> Part:
+    """Plants [M_c, m, l, g], (4, n), that move by a Runge-Kutta step of ``dt`` seconds at every sampling instant.
+
+    A state that would not be finite any more fails the run and stays the last finite one. Runs that have ended hold
+    still.
+    """
+    return Part(columns(params.shape[1], params, dt), sample=_step)
+
+
 def advance(x: Array, params: Array, u: Array, dt: float, samples: Array) -> None:
     """Integrate plants in place over ``len(samples)`` Runge-Kutta steps with the force held.
 
     Args:
-        x: states (4, n), overwritten by the states at the end.
+        x: states (4, n), overwritten by the states at the end, the last finite ones.
         params: [M_c, m, l, g] of each slot, (4, n).
         u: force in N of each slot, (n,).
         dt: step in s.
         samples: (steps, 2, n), filled with the positions [h, theta] after each step.
     """
-    for_slots(_advance, x.shape[1], _MICROSECONDS_A_STEP * len(samples), x, params, u, dt, samples)
-
-
-@kernel
-def _advance(start: int, stop: int, x: Array, params: Array, u: Array, dt: float, samples: Array) -> None:
-    work = np.empty(9 * LANES)
-    force = u.reshape((1, u.size))
-    for first in range(start, stop, LANES):
-        lanes = min(LANES, stop - first)
-        load(work, 0, x, first, lanes)
-        load(work, 4, params, first, lanes)
-        load(work, 8, force, first, lanes)
-        for k in range(samples.shape[0]):
-            for i in range(lanes):
-                state = (work[i], work[LANES + i], work[2 * LANES + i], work[3 * LANES + i])
-                inputs = (
-                    work[8 * LANES + i],
-                    work[4 * LANES + i],
-                    work[5 * LANES + i],
-                    work[6 * LANES + i],
-                    work[7 * LANES + i],
-                )
-                h, theta, v, omega = rk4(_plant, state, inputs, dt)
-                work[i] = h
-                work[LANES + i] = theta
-                work[2 * LANES + i] = v
-                work[3 * LANES + i] = omega
-            store(work, 0, samples[k], first, lanes)
-        store(work, 0, x, first, lanes)
+    loop = Loop(x.shape[1], len(samples), {"plant": moving(params, dt)})
+    loop.start(slice(None), x)
+    loop.u[:] = u
+    loop.run(positions=samples)
+    x[:] = loop.x
 
 
 @kernel

@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from importlib import resources
 from typing import Any
 
@@ -18,7 +19,8 @@ from numpy.typing import ArrayLike
 
 from .kernels import plain
 from .kernels.cart_pendulum import control_affine, energy
-from .plant import CartPendulum, advance
+from .loop import Loop
+from .plant import CartPendulum, moving
 from .typing import Array
 from .validation import array, multiple, number, unknown, whole
 
@@ -73,14 +75,8 @@ class Reference:
         Raises:
             ValueError: an element is no whole number of steps.
         """
-        steps = multiple("element", self.horizon / len(self.u), "dt", dt)
-        params = np.array(self.params)[:, None]
-        x = np.array(self.x0)[:, None]
-        states, sample = [x[:, 0].copy()], np.empty((1, 2, 1))
-        for u in np.repeat(self.u, steps):
-            advance(x, params, np.array([u]), dt, sample)
-            states.append(x[:, 0].copy())
-        return np.array(states).T
+        multiple("element", self.horizon / len(self.u), "dt", dt)
+        return _trajectory(self, float(dt)).copy()
 
     def to_json(self) -> str:
         """Text that :meth:`from_json` reads back to the same numbers."""
@@ -199,3 +195,17 @@ def minimum_energy(
         u=tuple(forces.tolist()),
         params=tuple(parameters),
     )
+
+
+@lru_cache(maxsize=8)
+def _trajectory(reference: Reference, dt: float) -> Array:
+    """Many environments of one table follow the same reference."""
+    steps = multiple("element", reference.horizon / len(reference.u), "dt", dt)
+    loop = Loop(1, 1, {"plant": moving(np.array(reference.params)[:, None], dt)})
+    loop.start(slice(None), np.array(reference.x0)[:, None])
+    states = [loop.x[:, 0].copy()]
+    for u in np.repeat(reference.u, steps):
+        loop.u[:] = u
+        loop.run()
+        states.append(loop.x[:, 0].copy())
+    return np.array(states).T

@@ -1,21 +1,38 @@
 """What the feedback laws share: where an observation holds the estimate, and the checks of weights."""
 
+import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..kernels import inlined
+from ..kernels.blocks import XD, XHAT, four
+from ..loop import Loop, Part
 from ..plant import CartPendulum
-from ..typing import Array
+from ..typing import Array, Flags, State
 from ..validation import array, number, observed, shape_of, short
 
+_TWO_PI = 2.0 * math.pi
+_ROUND = 6755399441055744.0  # adding 1.5 * 2**52 and taking it away rounds to a whole number
 
-def estimated_error(observation: ArrayLike, wrap: bool) -> Array:
-    """What a law should bring to zero, (..., 4): xhat, or xhat - x_d where the observation tells x_d.
 
-    With ``wrap`` the error of the angle is the one within half a turn: an encoder goes on counting, and a rod that has
-    turned is where it was.
+@inlined
+def error(signals: Array, i: int, wrap: float) -> State:
+    """What a law should bring to zero, xhat - x_d in lane i.
+
+    With ``wrap`` = 1 the error of the angle is the one within half a turn: an encoder goes on counting, and a rod that
+    has turned is where it was.
+    """
+    xhat, x_d = four(signals, XHAT, i), four(signals, XD, i)
+    angle = xhat[1] - x_d[1]
+    turns = wrap * ((angle / _TWO_PI + _ROUND) - _ROUND)
+    return xhat[0] - x_d[0], angle - _TWO_PI * turns, xhat[2] - x_d[2], xhat[3] - x_d[3]
+
+
+def told(observation: ArrayLike) -> tuple[Array, Array]:
+    """The estimate xhat and the reference x_d that an observation tells, each (..., 4); x_d = 0 where it tells none.
 
     The observation is [h, theta, xhat (4)], or with a reference [h, theta, x_d (4), preview (4 each), xhat (4)].
 
@@ -31,12 +48,71 @@ def estimated_error(observation: ArrayLike, wrap: bool) -> Array:
             f"observation has shape {seen.shape}, it must begin with [h, theta] and end with xhat (4): "
             "wrap the environment in smo_gym.ObserverWrapper or smo_gym.VectorObserverWrapper"
         )
-    error = seen[..., -4:] if size == 6 else seen[..., -4:] - seen[..., 2:6]
-    if not wrap:
-        return error
-    turns = np.zeros_like(error)
-    turns[..., 1] = np.rint(error[..., 1] / (2.0 * np.pi))
-    return np.asarray(error - 2.0 * np.pi * turns)
+    xhat = seen[..., -4:]
+    return xhat, np.zeros_like(xhat) if size == 6 else seen[..., 2:6]
+
+
+class Feedback:
+    """A law whose force is a block of xhat - x_d: what it needs besides is its :meth:`part`.
+
+    Attributes:
+        memory: how many of its part's first rows are the law's own state.
+    """
+
+    memory: ClassVar[int] = 0
+    _alone: Loop | None = None
+
+    def part(self, n: int) -> Part:
+        """What it puts into a loop of n slots.
+
+        Raises:
+            ValueError: it has gains for another number of slots.
+        """
+        raise NotImplementedError
+
+    def predict(
+        self,
+        observation: Array,
+        state: tuple[Array, ...] | None = None,
+        episode_start: Flags | None = None,
+        deterministic: bool = False,
+    ) -> tuple[Array, tuple[Array, ...] | None]:
+        """The force in N, and the law's own state after it.
+
+        Args:
+            observation: (n, observation) or (observation,), from an observer wrapper.
+            state: the law's own state, one array (n,) a number; None at the start.
+            episode_start: slots whose state begins anew, shape (n,).
+            deterministic: without effect: the law draws nothing.
+
+        Returns:
+            The force (n, 1), or (1,) for one observation, and the state for the next call.
+
+        Raises:
+            ValueError: the observation does not come from an observer wrapper, or is of another number of slots.
+        """
+        xhat, x_d = told(observation)
+        single = xhat.ndim == 1
+        n = 1 if single else len(xhat)
+        if self._alone is None or self._alone.n != n:
+            self._alone = Loop(n, 0, {"law": self.part(n)})
+        loop = self._alone
+        loop.xhat[:], loop.x_d[:] = np.atleast_2d(xhat).T, np.atleast_2d(x_d).T
+        own = loop.own("law")
+        loop.restart("law", slice(None))
+        if self.memory:
+            if state is not None:
+                for i in range(self.memory):
+                    own[i] = array(f"state[{i}]", state[i], (n,))
+            if shape_of(episode_start) not in ((), (n,)):
+                raise ValueError(f"episode_start={short(episode_start)} must hold {n} flags, one a slot")
+            if episode_start is not None:
+                begun = np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), n)
+                own[: self.memory, begun] = loop.initial("law")[: self.memory, begun]
+        loop.run()
+        after = tuple(row.copy() for row in own[: self.memory]) if self.memory else state
+        u = loop.u[:, None].copy()
+        return (u[0] if single else u), after
 
 
 def nominal(model: Any) -> CartPendulum:

@@ -9,14 +9,26 @@ from numpy.linalg import LinAlgError
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_continuous_are
 
-from ..typing import Array, Flags
+from ..kernels.blocks import U, at, block, four, offsets, put
+from ..loop import Part, columns
+from ..typing import Array
 from ..validation import array, shape_of, short, switch
-from .feedback import estimated_error, nominal, weights
+from .feedback import Feedback, error, nominal, weights
 
 _SLOWEST = 1e-6  # of the fastest pole's size: nearer to the axis a pole is on it, but for rounding
 
 
-class LQR:
+GAIN, WRAP, _ = offsets(4, 1)
+
+
+@block
+def _act(signals: Array, own: Array, lanes: int) -> None:
+    for i in range(lanes):
+        K, e = four(own, GAIN, i), error(signals, i, at(own, WRAP, i))
+        put(signals, U, i, -(K[0] * e[0] + K[1] * e[1] + K[2] * e[2] + K[3] * e[3]))
+
+
+class LQR(Feedback):
     """u = -K xhat, or u = -K (xhat - x_d) where there is a reference to track.
 
     Args:
@@ -65,25 +77,15 @@ class LQR:
             )
         return cls(K, wrap)
 
-    def predict(
-        self,
-        observation: Array,
-        state: tuple[Array, ...] | None = None,
-        episode_start: Flags | None = None,
-        deterministic: bool = False,
-    ) -> tuple[Array, tuple[Array, ...] | None]:
-        """The force in N, shape (n, 1) for observations (n, observation) and (1,) for one; the law has no state.
+    def part(self, n: int) -> Part:
+        """What it puts into a loop of n slots.
 
         Raises:
-            ValueError: the observation does not come from an observer wrapper, or K has another number of slots.
+            ValueError: K has another number of slots.
         """
-        e = estimated_error(observation, self.wrap)
-        if len(self.K) > 1 and e.shape[:-1] != (len(self.K),):
-            raise ValueError(f"K has {len(self.K)} slots, the observation has shape {np.shape(observation)}")
-        # one order of summation for every batch size, which a matrix product does not promise
-        K = self.K
-        u = -(K[:, 0] * e[..., 0] + K[:, 1] * e[..., 1] + K[:, 2] * e[..., 2] + K[:, 3] * e[..., 3])
-        return (u[:, None] if e.ndim == 2 else u), state
+        if len(self.K) not in (1, n):
+            raise ValueError(f"K has {len(self.K)} slots, the observation has {n}")
+        return Part(columns(n, self.K.T, float(self.wrap)), act=_act)
 
     def __repr__(self) -> str:
         return f"LQR(K={self.K.squeeze().tolist()})"

@@ -1,19 +1,36 @@
 """The article's sliding mode control with a periodic switching function, equations (49)-(50)."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..article import SMC_GAINS
-from ..kernels import kernel
+from ..kernels.blocks import U, at, block, four, offsets, put
 from ..kernels.elementary import sincos, tanh
-from ..typing import Array, Flags
+from ..loop import Part, columns
+from ..typing import Array
 from ..validation import array, number, shape_of, short, switch
-from .feedback import estimated_error
+from .feedback import Feedback, error
+
+INTEGRAL, GAINS, SLOPE, AMPLITUDE, LAM, PI_OVER_EPSILON, PERIOD, WRAP, _ = offsets(1, 4, 1, 1, 1, 1, 1, 1)
 
 
-class SlidingModeController:
+@block
+def _act(signals: Array, own: Array, lanes: int) -> None:
+    for i in range(lanes):
+        k, integral = four(own, GAINS, i), at(own, INTEGRAL, i)
+        h, theta, v, omega = error(signals, i, at(own, WRAP, i))
+        cart = k[0] * h + k[2] * v
+        rod = k[1] * theta + k[3] * omega
+        s = 0.5 * cart * cart + 0.5 * rod * rod
+        sin, _ = sincos(at(own, PI_OVER_EPSILON, i) * (s + at(own, LAM, i) * integral))
+        put(signals, U, i, at(own, AMPLITUDE, i) * tanh(at(own, SLOPE, i) * sin))
+        put(own, INTEGRAL, i, integral + at(own, PERIOD, i) * tanh(s))
+
+
+class SlidingModeController(Feedback):
     """Sliding mode control of the estimated state, held over each control period.
 
     ::
@@ -37,6 +54,8 @@ class SlidingModeController:
     Raises:
         ValueError: a gain is not positive or has a wrong shape.
     """
+
+    memory: ClassVar[int] = 1
 
     def __init__(
         self,
@@ -67,56 +86,18 @@ class SlidingModeController:
         self.wrap = switch("wrap", wrap)
         rows = [self.k, np.broadcast_to(np.minimum(self.slope, 1e300)[..., None], (*shape[:-1], 1))]  # 1e300: sgn
         self._gains = np.atleast_2d(np.concatenate(rows, axis=-1))
-        self._settings = np.array([self.Z0, self.lam, math.pi / self.epsilon, self.dt])
 
-    def predict(
-        self,
-        observation: Array,
-        state: tuple[Array, ...] | None = None,
-        episode_start: Flags | None = None,
-        deterministic: bool = False,
-    ) -> tuple[Array, tuple[Array, ...] | None]:
-        """The force in N and the integral after it.
-
-        Args:
-            observation: (n, observation) or (observation,), from an observer wrapper.
-            state: ``(integral,)`` with the integral of tanh(s), shape (n,); None at the start.
-            episode_start: slots whose integral starts at 0, shape (n,).
-            deterministic: without effect: the law draws nothing.
-
-        Returns:
-            The force (n, 1), or (1,) for one observation, and the state for the next call.
+    def part(self, n: int) -> Part:
+        """What it puts into a loop of n slots.
 
         Raises:
-            ValueError: the observation does not come from an observer wrapper.
+            ValueError: k has another number of slots.
         """
-        e = np.atleast_2d(estimated_error(observation, self.wrap))
-        n = len(e)
         if len(self._gains) not in (1, n):
-            raise ValueError(f"k has {len(self._gains)} slots, the observation has shape {np.shape(observation)}")
-        integral = np.zeros(n) if state is None else array("state[0]", state[0], (n,))
-        if shape_of(episode_start) not in ((), (n,)):
-            raise ValueError(f"episode_start={short(episode_start)} must hold {n} flags, one a slot")
-        if episode_start is not None:
-            integral[np.broadcast_to(np.asarray(episode_start, dtype=np.bool_), n)] = 0.0
-        u = np.empty((n, 1))
-        _switch(e, integral, self._gains, self._settings, u)
-        return (u if np.ndim(observation) == 2 else u[0]), (integral,)
+            raise ValueError(f"k has {len(self._gains)} slots, the observation has {n}")
+        settings = (self.Z0, self.lam, math.pi / self.epsilon, self.dt, float(self.wrap))
+        return Part(columns(n, 0.0, self._gains.T, *settings), act=_act)
 
     def __repr__(self) -> str:
         settings = {name: getattr(self, name) for name in ("dt", "slope", "Z0", "lam", "epsilon")}
         return f"SlidingModeController(k={self.k.tolist()}, {', '.join(f'{k}={v}' for k, v in settings.items())})"
-
-
-@kernel
-def _switch(e: Array, integral: Array, gains: Array, settings: Array, u: Array) -> None:
-    Z0, lam, pi_over_epsilon, dt = settings
-    for i in range(len(u)):
-        k1, k2, k3, k4, slope = gains[min(i, len(gains) - 1)]  # one row for all slots, or one each
-        h, theta, v, omega = e[i, 0], e[i, 1], e[i, 2], e[i, 3]
-        cart = k1 * h + k3 * v
-        rod = k2 * theta + k4 * omega
-        s = 0.5 * cart * cart + 0.5 * rod * rod
-        sin, _ = sincos(pi_over_epsilon * (s + lam * integral[i]))
-        u[i, 0] = Z0 * tanh(slope * sin)
-        integral[i] += dt * tanh(s)

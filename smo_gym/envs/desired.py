@@ -13,6 +13,7 @@ class Desired:
     """A task's reference, and then rest at its end.
 
     Attributes:
+        instants: x_d at each sampling instant, (steps substeps + 1, 4).
         states: x_d at each control instant, (steps + 1, 4).
         positions: [h_d, theta_d] at the sampling instants of the control period that ends at each control instant,
             (steps + 1, substeps, 2).
@@ -30,6 +31,7 @@ class Desired:
         rest = np.repeat([reference.xT], max(needed - len(x_d), 0), axis=0)
         x_d = np.concatenate([x_d, rest])
         ahead = x_d[:needed:n]
+        self.instants = x_d[: task.steps * n + 1]
         self.states = ahead[: task.steps + 1]
         later = x_d[1 : task.steps * n + 1, :2].reshape(task.steps, n, 2)
         self.positions = np.concatenate([np.repeat(x_d[None, :1, :2], n, axis=1), later])

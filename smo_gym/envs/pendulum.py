@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import gymnasium
@@ -9,15 +11,19 @@ import numpy as np
 from gymnasium import logger
 from gymnasium.error import ResetNeeded
 
+from ..kernels.blocks import FAILED, REWARD, XD, U, X, Y
+from ..loop import Part
+from ..plant import PARAMS
 from ..typing import Array
 from ..validation import mapping, short
 from .desired import Desired
 from .rendering import MODES, Renderer, Scene
 from .spec import Specified
-from .task import HANGING, TRACKING, UPRIGHT, Stepper, Task, applied_force
+from .stepping import loop_of
+from .task import HANGING, TRACKING, UPRIGHT, Task
 
 RESET_OPTIONS = ("state", "params")
-_REST = np.zeros((1, 4))
+_ALL = slice(None)
 
 
 class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
@@ -71,8 +77,9 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
     ## Information
 
     At every step, with the same keys: `state` (4,) and `params` [M_c, m, l, g] (4,), the truth; `force`, what the
-    actuator applied; `samples` (substeps, 2), the encoders at each sampling instant of the control period just run;
-    with a reference also `desired` (substeps, 2), where h and theta should have been then.
+    actuator applied; `samples` (substeps, 2), what the encoders measured at each sampling instant of the control
+    period just run, and `positions` (substeps, 2), the truth then; with a reference also `desired` (substeps, 2),
+    where h and theta should have been.
 
     ## Arguments
 
@@ -120,7 +127,8 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         self.metadata = {**self.metadata, "render_fps": fps}  # type: ignore[misc]
         self.observation_space = self.task.observation_space
         self.action_space = self.task.action_space
-        self._stepper = Stepper(self.task)
+        self.loop = loop_of(self.task, 1)
+        self._substeps, self._steps = self.task.substeps, self.task.steps
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._steps_left = 0
         self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
@@ -132,9 +140,11 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         asked = self.task.asked(mapping("reset option", options or {}, RESET_OPTIONS))
         super().reset(seed=seed)
         params, x = self.task.case(self.np_random, asked)
-        self._x, self._params = x[:, None], params[:, None]
-        self._steps_left = self._stepper.steps
-        samples = np.repeat(x[None, :2], self._stepper.substeps, axis=0)
+        self.loop.start(_ALL, x[:, None])
+        self.loop.own("plant")[PARAMS : PARAMS + 4, 0] = params
+        self._params = params
+        self._steps_left = self._steps
+        samples = np.repeat(x[None, :2], self._substeps, axis=0)
         self._see(0, 0.0)
         return self._observation(0), self._info(samples, 0.0, 0)
 
@@ -148,18 +158,25 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
             raise ValueError(f"action={short(action)} must be an array of numbers of shape (1,)") from None
         if wanted.shape != (1,):
             raise ValueError(f"action={short(action)} has shape {wanted.shape}, it must have shape (1,)")
-        u = applied_force(wanted[None], 1, self.task.force_limit)
+        force = wanted.item()
+        if not math.isfinite(force):
+            raise ValueError(f"action={force} must be finite")
         self._steps_left -= 1
-        k = self._stepper.steps - self._steps_left
-        x_d = _REST if self._desired is None else self._desired.states[k : k + 1]
-        samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
-        terminated = bool(failed[0])
+        k = self._steps - self._steps_left
+        loop, samples = self.loop, np.empty((self._substeps, 2, 1))
+        rows = loop.rows
+        rows[U, 0] = force
+        if self._desired is not None:
+            rows[XD : XD + 4, 0] = self._desired.states[k]
+        loop.run(positions=samples)
+        terminated = bool(rows[FAILED, 0] > 0.0)
         truncated = self._steps_left == 0 and not terminated
         if terminated:
             self._steps_left = 0
-        self._see(k, float(u[0]))
-        info = self._info(samples[:, :, 0], float(u[0]), k)
-        return self._observation(k), float(reward[0]), terminated, truncated, info
+        force = float(rows[U, 0])
+        self._see(k, force)
+        info = self._info(samples[:, :, 0], force, k)
+        return self._observation(k), float(rows[REWARD, 0]), terminated, truncated, info
 
     def render(self) -> Any:
         """The frame of the mode: an array (height, width, 3) or, in a window, None."""
@@ -180,6 +197,10 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         if self.render_mode == "human" and self._scene is not None:
             self.render()
 
+    def plug(self, observer: Part | Sequence[Part]) -> None:
+        """Let an observer work inside of the loop; whoever plugs it starts it, too."""
+        self.loop = self.loop.with_parts(observer=observer)
+
     def close(self) -> None:
         """Close the window, if there is one."""
         if self._renderer is not None:
@@ -189,19 +210,20 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         if self.render_mode is None:
             return
         x_d = None if self._desired is None else self._desired.states[k]
-        self._scene = Scene(k * self.task.control_period, self._x[:, 0].copy(), self._params[2, 0], force, x_d)
+        self._scene = Scene(k * self.task.control_period, self.loop.x[:, 0].copy(), self._params[2], force, x_d)
         if self.render_mode == "human" and self._ghost is None:  # else once the ghost has moved, too
             self.render()
 
     def _observation(self, k: int) -> Array:
-        y = self._x[:2, 0]
+        y = self.loop.rows[Y : Y + 2, 0]
         return y.copy() if self._desired is None else np.concatenate([y, self._desired.told[k]])
 
     def _info(self, samples: Array, force: float, k: int) -> dict[str, Any]:
         info = {
-            "state": self._x[:, 0].copy(),
-            "params": self._params[:, 0].copy(),
+            "state": self.loop.rows[X : X + 4, 0].copy(),
+            "params": self._params.copy(),
             "force": force,
+            "positions": samples,
             "samples": samples,
         }
         if self._desired is not None:

@@ -10,13 +10,11 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import ArrayLike
 
-from ..kernels import kernel
-from ..plant import CartPendulum, advance
+from ..plant import CartPendulum
 from ..reference import Reference, shipped
-from ..typing import Array, Flags
-from ..validation import array, limit, mapping, multiple, number, shape_of, short, unknown, whole
+from ..typing import Array
+from ..validation import array, limit, mapping, multiple, number, shape_of, unknown, whole
 
 _FURTHEST = 10_000  # control instants of a preview: an observation holds four numbers of each
 
@@ -202,78 +200,3 @@ def plain_data(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     return value.value if isinstance(value, Enum) else value
-
-
-def applied_force(action: ArrayLike, n: int, bound: float, ignored: Flags | None = None) -> Array:
-    """The force in N that the actuator applies, (n,): the actions (n, 1) clipped to its limit, 0 where ignored.
-
-    Raises:
-        ValueError: the shape is not (n, 1), or an action is not finite.
-    """
-    try:
-        wanted = np.array(action, dtype=np.float64)  # a copy: the kernel is compiled for plain arrays alone
-    except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"action={short(action)} must be an array of numbers of shape {(n, 1)}") from None
-    if wanted.shape != (n, 1):
-        raise ValueError(f"action has shape {wanted.shape}, it must have shape {(n, 1)}")
-    if ignored is not None:
-        wanted[ignored] = 0.0
-    u = np.empty(n)
-    slot = _saturate(wanted, bound, u)
-    if slot >= 0:
-        raise ValueError(f"action={wanted[slot, 0]} (slot {slot}) must be finite")
-    return u
-
-
-@kernel
-def _saturate(wanted: Array, bound: float, u: Array) -> int:
-    """Clip; the first slot whose action is not finite, or -1."""
-    for i in range(len(u)):
-        if not math.isfinite(wanted[i, 0]):
-            return i
-        u[i] = min(max(wanted[i, 0], -bound), bound)
-    return -1
-
-
-class Stepper:
-    """The compiled part of a step, with the task's numbers unpacked once."""
-
-    def __init__(self, task: Task) -> None:
-        self.dt, self.substeps, self.steps = task.dt, task.substeps, task.steps
-        weights = [*task.reward.q, task.reward.r]
-        self._settings = np.array(
-            [*(w * task.control_period for w in weights), task.reward.failure, task.track_limit, task.angle_limit]
-        )
-
-    def step(self, x: Array, params: Array, u: Array, x_d: Array) -> tuple[Array, Array, Flags]:
-        """Advance the states ``x`` (4, n) in place by one control period that should end at ``x_d`` (n, 4).
-
-        A state that is not finite any more fails, and is told as it was before the period.
-
-        Returns:
-            The samples (substeps, 2, n), the rewards (n,) and whether the episode failed (n,).
-        """
-        n = x.shape[1]
-        samples, reward, failed = np.empty((self.substeps, 2, n)), np.empty(n), np.empty(n, dtype=np.bool_)
-        before = x.copy()
-        advance(x, params, u, self.dt, samples)
-        _judge(x, x_d, u, self._settings, reward, failed)
-        if np.count_nonzero(failed):
-            lost = ~np.isfinite(x).all(axis=0)
-            x[:, lost] = before[:, lost]
-            samples[:, :, lost] = before[:2, lost]
-        return samples, reward, failed
-
-
-@kernel
-def _judge(x: Array, x_d: Array, u: Array, settings: Array, reward: Array, failed: Flags) -> None:
-    q_h, q_theta, q_v, q_omega, r, penalty, track, angle = settings
-    for i in range(len(u)):
-        h, theta, v, omega = x[0, i], x[1, i], x[2, i], x[3, i]
-        e_h, e_theta, e_v, e_omega = h - x_d[i, 0], theta - x_d[i, 1], v - x_d[i, 2], omega - x_d[i, 3]
-        cost = q_h * e_h**2 + q_theta * e_theta**2 + q_v * e_v**2 + q_omega * e_omega**2 + r * u[i] ** 2
-        finite = math.isfinite(h + theta + v + omega + cost)
-        inside = finite and abs(h) <= track and abs(theta) <= angle
-        failed[i] = not inside
-        # a state that is not finite has no cost, only the penalty
-        reward[i] = -(cost if finite else 0.0) - (0.0 if inside else penalty)

@@ -15,13 +15,16 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from ..loop import Part
+from ..plant import PARAMS
 from ..typing import Array, Flags
 from ..validation import mapping, short, whole
 from .desired import Desired
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .rendering import Renderer, Scene
 from .spec import Specified
-from .task import Stepper, Task, applied_force
+from .stepping import checked_force, loop_of
+from .task import Task
 
 
 class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
@@ -73,16 +76,13 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self.single_action_space = self.task.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._stepper = Stepper(self.task)
+        self.loop = loop_of(self.task, num_envs)
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
-        self._rest = np.zeros((num_envs, 4))
         self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
         self._force = np.zeros(num_envs)
         self._ghosts: Array | None = None
         self._generators: list[np.random.Generator] = []
         self._seeds: list[int] = []
-        self._x = np.zeros((4, num_envs))
-        self._params = np.repeat(self.task.params.as_array()[:, None], num_envs, axis=1)
         self._k = np.zeros(num_envs, dtype=np.int64)  # the control instant that each slot is at
         self._cut = np.full(num_envs, self.task.steps)  # and the one that ends its episode
         self._terminated = np.zeros(num_envs, dtype=np.bool_)
@@ -131,24 +131,26 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
             raise ResetNeeded("no episode has begun: call reset() before step()")
         over = self._terminated | self._truncated
         waiting = np.count_nonzero(over) > 0
+        loop, samples = self.loop, np.empty((self.task.substeps, 2, self.num_envs))
+        loop.u[:] = checked_force(actions, self.num_envs, over if waiting else None)
         if waiting:
-            held = self._x[:, over]
-        u = applied_force(actions, self.num_envs, self.task.force_limit, over if waiting else None)
+            loop.alive[over] = 0.0
         self._k[~over] += 1
-        x_d = self._rest if self._desired is None else self._desired.states[self._k]
-        samples, reward, failed = self._stepper.step(self._x, self._params, u, x_d)
-        terminated, truncated = failed, (self._k == self._cut) & ~failed
+        if self._desired is not None:
+            loop.x_d[:] = self._desired.states[self._k].T
+        loop.run(positions=samples)
+        reward, terminated = loop.reward.copy(), loop.failed > 0.0
+        truncated = (self._k == self._cut) & ~terminated
+        force = loop.u.copy()
         if waiting:
-            reward[over] = 0.0
             if self.autoreset_mode is AutoresetMode.DISABLED:
-                self._x[:, over] = held
                 terminated[over], truncated[over] = self._terminated[over], self._truncated[over]
             else:  # the step after the end is the reset (NEXT_STEP)
                 terminated[over] = truncated[over] = False
                 self._start(over, [])
-            samples[:, :, over] = self._x[:2, over]
+                samples[:, :, over] = loop.x[:2, over]
         self._terminated, self._truncated = terminated.copy(), truncated.copy()
-        info = self._info(samples, u)
+        info = self._info(samples, force)
         ended = terminated | truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(ended):
             info = self._restart(ended, info)
@@ -163,7 +165,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         final_info = {key: only(value, ended) for key, value in final.items()}
         self._start(ended, [])
         samples, force = final["samples"].copy(), final["force"].copy()
-        samples[ended] = self._x[:2, ended].T[:, None]
+        samples[ended] = self.loop.x[:2, ended].T[:, None]
         force[ended] = 0.0
         return {
             **self._info(samples.transpose(1, 2, 0), force),
@@ -185,7 +187,13 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         x_d = [None] * self.num_envs if self._desired is None else self._desired.states[self._k]
         return tuple(
             self._renderer.draw(
-                Scene(k * self.task.control_period, self._x[:, i].copy(), self._params[2, i], self._force[i], x_d[i]),
+                Scene(
+                    k * self.task.control_period,
+                    self.loop.x[:, i].copy(),
+                    self._params_told[i, 2],
+                    self._force[i],
+                    x_d[i],
+                ),
                 None if self._ghosts is None else self._ghosts[:, i],
             )
             for i, k in enumerate(self._k.tolist())
@@ -195,6 +203,14 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         """Draw estimates (4, n) beside the states; whoever estimates calls it after each estimate."""
         if self.render_mode is not None:
             self._ghosts = ghosts.copy()
+
+    def plug(self, observer: Part | Sequence[Part]) -> None:
+        """Let an observer work inside of the loop; whoever plugs it starts it, too."""
+        self.loop = self.loop.with_parts(observer=observer)
+
+    def hold(self, slots: Flags) -> None:
+        """End the episodes of the marked slots, (n,), here: where nothing restarts them they hold still."""
+        self._truncated |= slots & ~self._terminated
 
     def _mask(self, mask: Any) -> Flags:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
@@ -228,9 +244,10 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
     def _start(self, mask: Flags, asked: Sequence[tuple[Array | None, Array | None]]) -> None:
         slots = np.flatnonzero(mask)
         cases = [self.task.case(self._generators[i], asked[i] if asked else (None, None)) for i in slots.tolist()]
-        for i, (params, x) in zip(slots, cases, strict=True):
-            self._params[:, i], self._x[:, i] = params, x
-        self._params_told = self._params.T.copy()
+        params = self.loop.own("plant")[PARAMS : PARAMS + 4]
+        params[:, slots] = np.array([case[0] for case in cases]).T
+        self.loop.begin(slots, np.array([case[1] for case in cases]).T)
+        self._params_told = params.T.copy()
         self._params_told.flags.writeable = False  # infos share it
         self._k[mask], self._cut[mask] = 0, self.task.steps
         self._terminated[mask] = self._truncated[mask] = False
@@ -245,28 +262,30 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
 
     def _still(self) -> Array:
         """Samples (substeps, 2, n) of plants that have not moved."""
-        return np.repeat(self._x[None, :2], self._stepper.substeps, axis=0)
+        return np.repeat(self.loop.x[None, :2], self.task.substeps, axis=0)
 
     def _observation(self) -> Array:
         if self._desired is None:
-            return self._x[:2].T.copy()
+            return self.loop.y.T.copy()
         told = self._desired.told[self._k]
         observation = np.empty((self.num_envs, 2 + told.shape[1]))
-        observation[:, :2] = self._x[:2].T
+        observation[:, :2] = self.loop.y.T
         observation[:, 2:] = told
         return observation
 
     def _info(self, samples: Array, force: Array) -> dict[str, Any]:
         self._force = force
-        everywhere = self._everywhere
+        everywhere, told = self._everywhere, samples.transpose(2, 0, 1)
         info = {
-            "state": self._x.T.copy(),
+            "state": self.loop.x.T.copy(),
             "_state": everywhere,
             "params": self._params_told,
             "_params": everywhere,
             "force": force,
             "_force": everywhere,
-            "samples": samples.transpose(2, 0, 1),
+            "positions": told,
+            "_positions": everywhere,
+            "samples": told,
             "_samples": everywhere,
         }
         if self._desired is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Sequence
 from functools import cache
 from pathlib import Path
@@ -14,7 +13,8 @@ from pydantic import Field, field_validator, model_validator
 
 from .. import files
 from ..controllers import Agent, title
-from ..envs.task import Task, applied_force
+from ..envs.stepping import checked_force
+from ..envs.task import Task
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
 from ..validation import number
 from ..wrappers import VectorObserverWrapper
@@ -225,7 +225,7 @@ def _try_controller(scenario: Scenario, name: str) -> None:
     observation, _ = VectorObserverWrapper(env, scenario.controllers[name].observer.build(True)).reset(seed=0)
     try:
         action, _ = agent.predict(observation, None, np.ones(2, dtype=np.bool_), True)
-        applied_force(action, 2, math.inf)
+        checked_force(action, 2)
     except Exception as error:  # whatever a user's agent may raise
         place = f"{scenario.environment} on observations of shape {observation.shape}"
         raise ValueError(f"{name}: cannot act in {place} ({type(error).__name__}: {error})") from error

@@ -16,8 +16,9 @@ from ..plant import STATE_NAMES, CartPendulum
 from ..typing import Array, Flags
 from ..validation import choice
 from ..wrappers import VectorObserverWrapper
-from .rollout import Traces, rollout
+from .rollout import rollout
 from .scenario import ControllerSettings, Scenario
+from .traces import Traces
 
 ARMS = ("without", "with", "theorem", "oracle")
 """Compensation of the input uncertainty off, on; gains designed for the theorem; the true state for an estimate."""

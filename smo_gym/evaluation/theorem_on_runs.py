@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import cast
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode
 
-from ..controllers import Agent
-from ..observers import Period, SlidingModeObserver
+from ..controllers import Feedback
+from ..envs.vector import PendulumVectorEnv
+from ..loop import Loop
+from ..observers import Estimator, Gains, SlidingModeObserver
 from ..theorem import OperatingSet, layer, position_bound, reaching_time, suprema, velocity_bound
 from ..typing import Array, Flags
+from .drivers import driven
+from .traces import Watch
 
 SHARES = np.array([0.1, 0.5, 0.9])
 """The kappa of the bound that holds with tanh, as shares of m1 - V."""
@@ -63,7 +67,7 @@ class Convergence:
 
 def converge(
     observers: Mapping[str, SlidingModeObserver],
-    agent: Agent,
+    agent: Feedback,
     over: OperatingSet,
     starts: Array,
     plants: Array,
@@ -78,7 +82,7 @@ def converge(
 
     Args:
         observers: by name; the first one feeds the agent.
-        agent: control law on [h, theta, xhat].
+        agent: control law.
         over: the operating set, whose suprema give kappa_1, kappa_2 and the layer.
         starts: x(0), (n, 4).
         plants: [M_c, m, l, g], (n, 4).
@@ -93,8 +97,8 @@ def converge(
     """
     if not (np.array(next(iter(observers.values())).gains.m1) > over.speed).all():  # type: ignore[union-attr]
         raise ValueError(f"the first observer's m1 must exceed the speeds {over.speed} of the operating set, (28)")
-    n, steps = len(starts), round(horizon / dt)
-    env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
+    n = len(starts)
+    env = gymnasium.make_vec(
         "SMOPendulum-v0",
         n,
         autoreset_mode=AutoresetMode.DISABLED,
@@ -104,60 +108,94 @@ def converge(
         force_limit=None,
         track_limit=None,
     )
-    y, info = env.reset(options={"state": starts, "params": plants})
-    estimators: dict[str, Any] = {name: o.start(n, dt, force, over.model) for name, o in observers.items()}
-    first, watched = next(iter(observers)), next(iter(estimators.values()))
-    gains: Any = observers[first].gains
-    bounds = suprema(over)
-    half = layer(bounds.speed, gains.m1, observers[first].slopes[0])[:, None]
-    x = info["state"].T
-    promised = reaching_time(x[:2] - watched.xhat[:2], np.array(gains.m1)[:, None], bounds.speed[:, None])
-    kappa = SHARES[:, None] * (np.array(gains.m1) - bounds.speed)
-    bound = position_bound(bounds.speed, gains.m1, observers[first].slopes[0], kappa)[:, :, None]
-    bound_from = np.abs(x[:2] - watched.xhat[:2]) / kappa[:, :, None]
-    bounded, settled = np.ones((len(SHARES), 2, n), dtype=np.bool_), np.zeros((2, n))
-    promised_velocity = np.full((2, n), np.nan)
-    stayed = over.holds(x, watched.xhat)
-    reached, velocity_error = np.zeros((2, n)), np.full((2, n), np.nan)
-    largest = np.zeros(7)
-    squares, count = {name: np.zeros((2, n)) for name in observers}, 0
-    for k in range(1, steps + 1):
-        action, _ = agent.predict(np.concatenate([y, watched.xhat.T], axis=1))
-        y_before = y.T.copy()
-        y, _, _, _, info = env.step(action)
-        x, time = np.ascontiguousarray(info["state"].T), k * dt
-        samples = np.ascontiguousarray(info["samples"].transpose(1, 2, 0))
-        for estimator in estimators.values():
-            estimator.update(Period(y_before, samples, info["force"], x))
-        xhat = watched.xhat
-        u = info["force"]
-        stayed &= over.holds(x, xhat) & (np.abs(u) <= force)
-        largest = np.maximum(largest, np.abs(np.concatenate([x[1:], xhat[1:], u[None]])).max(axis=1))
-        reached = np.where(np.abs(x[:2] - xhat[:2]) > half, time, reached)
-        bounded &= (time < bound_from) | (np.abs(x[:2] - xhat[:2]) <= bound)
+    inner = cast(PendulumVectorEnv, env.unwrapped)
+    name, first = next(iter(observers.items()))
+    inner.plug(first.part(n, dt, force, over.model))
+    env.reset(options={"state": starts, "params": plants})
+    inner.loop.restart("observer", slice(None))
+    others = {other: o.start(n, dt, force, over.model) for other, o in observers.items() if other != name}
+    for estimator in others.values():
+        estimator.reset(np.ones(n, dtype=np.bool_), inner.loop.y)
+    counters = _Counters(name, first, others, over, force, settle, dt, inner.loop)
+    driven(inner, agent, {}, Watch([counters], progress))
+    return counters.found(horizon)
+
+
+class _Counters:
+    """Looks on at every control instant."""
+
+    every = 1
+
+    def __init__(
+        self,
+        name: str,
+        first: SlidingModeObserver,
+        others: Mapping[str, Estimator],
+        over: OperatingSet,
+        force: float,
+        settle: float,
+        dt: float,
+        loop: Loop,
+    ) -> None:
+        self._name, self._first, self._others = name, first, others
+        self._over, self._force, self._settle, self._dt = over, force, settle, dt
+        self._gains = Gains.of(first.gains)
+        self._bounds = suprema(over)
+        self._half = layer(self._bounds.speed, self._gains.m1, first.slopes[0])[:, None]
+        self._count = 0
+        x, xhat, n = loop.x.copy(), loop.xhat.copy(), loop.n
+        m1, speed = np.array(self._gains.m1), self._bounds.speed
+        self._promised = reaching_time(x[:2] - xhat[:2], m1[:, None], speed[:, None])
+        kappa = SHARES[:, None] * (m1 - speed)
+        self._bound = position_bound(speed, self._gains.m1, self._first.slopes[0], kappa)[:, :, None]
+        self._bound_from = np.abs(x[:2] - xhat[:2]) / kappa[:, :, None]
+        self._bounded, self._settled = np.ones((len(SHARES), 2, n), dtype=np.bool_), np.zeros((2, n))
+        self._promised_velocity = np.full((2, n), np.nan)
+        self._stayed = self._over.holds(x, xhat)
+        self._reached, self._velocity_error = np.zeros((2, n)), np.full((2, n), np.nan)
+        self._largest = np.zeros(7)
+        self._squares = {name: np.zeros((2, n)) for name in (self._name, *self._others)}
+
+    def look(self, k: int, loop: Loop) -> None:
+        """Count what this instant shows."""
+        if k == 0:
+            return
+        x, xhat, u, time = loop.x.copy(), loop.xhat.copy(), loop.u.copy(), k * self._dt
+        for estimator in self._others.values():
+            estimator.update(loop.y[None].copy(), u)
+        self._stayed &= self._over.holds(x, xhat) & (np.abs(u) <= self._force)
+        self._largest = np.maximum(self._largest, np.abs(np.concatenate([x[1:], xhat[1:], u[None]])).max(axis=1))
+        offset = np.abs(x[:2] - xhat[:2])
+        self._reached = np.where(offset > self._half, time, self._reached)
+        self._bounded &= (time < self._bound_from) | (offset <= self._bound)
         error = np.abs(x[2:] - xhat[2:])
-        at_t0 = np.isnan(promised_velocity) & (time >= promised)
-        t1 = promised + reaching_time(error, np.array(gains.beta_1)[:, None], bounds.drift[:, None])
-        promised_velocity = np.where(at_t0, t1, promised_velocity)
-        velocity_error = np.where(time >= promised_velocity, np.fmax(velocity_error, error), velocity_error)
-        if time >= settle:
-            count += 1
-            settled = np.maximum(settled, error)
-            for name, estimator in estimators.items():
-                squares[name] += (x[2:] - estimator.xhat[2:]) ** 2
-        if k % 100 == 0:
-            progress(100)
-    progress(steps % 100)
-    return Convergence(
-        stayed=stayed,
-        promised=promised,
-        reached=reached,
-        promised_velocity=promised_velocity,
-        velocity_error=velocity_error,
-        bounded=bounded,
-        velocity_bound=velocity_bound(observers[first], over, force),
-        velocity_settled=settled,
-        velocity_rms={name: np.sqrt(total[:, stayed].mean(axis=1) / count) for name, total in squares.items()},
-        largest=largest,
-        horizon=horizon,
-    )
+        at_t0 = np.isnan(self._promised_velocity) & (time >= self._promised)
+        t1 = self._promised + reaching_time(error, np.array(self._gains.beta_1)[:, None], self._bounds.drift[:, None])
+        self._promised_velocity = np.where(at_t0, t1, self._promised_velocity)
+        late = time >= self._promised_velocity
+        self._velocity_error = np.where(late, np.fmax(self._velocity_error, error), self._velocity_error)
+        if time >= self._settle:
+            self._count += 1
+            self._settled = np.maximum(self._settled, error)
+            self._squares[self._name] += (x[2:] - xhat[2:]) ** 2
+            for name, estimator in self._others.items():
+                self._squares[name] += (x[2:] - estimator.xhat[2:]) ** 2
+
+    def found(self, horizon: float) -> Convergence:
+        """What the runs showed."""
+        stayed, count = self._stayed, self._count
+        return Convergence(
+            stayed=stayed,
+            promised=self._promised,
+            reached=self._reached,
+            promised_velocity=self._promised_velocity,
+            velocity_error=self._velocity_error,
+            bounded=self._bounded,
+            velocity_bound=velocity_bound(self._first, self._over, self._force),
+            velocity_settled=self._settled,
+            velocity_rms={
+                name: np.sqrt(total[:, stayed].mean(axis=1) / count) for name, total in self._squares.items()
+            },
+            largest=self._largest,
+            horizon=horizon,
+        )

@@ -16,17 +16,24 @@ from ..validation import whole
 from . import inlined
 
 LANES = 64
+VECTOR = 8
+"""Lanes that one vector instruction takes at most."""
 # Below this many microseconds of work for one core, waking a second thread costs more than it saves.
 _WORTH_A_THREAD = 500.0
 
 
 @inlined
-def load(work: Array, row: int, rows: Array, first: int, lanes: int) -> None:
-    """Copy ``lanes`` slots from slot ``first`` on of a (rows, n) array into the workspace's rows from ``row`` on."""
+def load(work: Array, row: int, rows: Array, first: int, lanes: int, width: int) -> None:
+    """Copy ``lanes`` slots from slot ``first`` on of a (rows, n) array into the workspace's rows from ``row`` on.
+
+    Lanes from there up to ``width`` repeat the first slot.
+    """
     for r in range(rows.shape[0]):
         target, source = work[(row + r) * LANES :], rows[r, first:]
         for i in range(lanes):
             target[i] = source[i]
+        for i in range(lanes, width):
+            target[i] = source[0]
 
 
 @inlined
@@ -71,14 +78,15 @@ def set_threads(threads: int) -> None:
     _pool.drop()
 
 
-def for_slots(kernel: Callable[..., None], n: int, microseconds_a_slot: float, *args: Any) -> None:
-    """Run ``kernel(start, stop, *args)`` over slots 0 to n, in threads of whole blocks where the work is worth it."""
-    if n * microseconds_a_slot < _WORTH_A_THREAD or n <= LANES or _pool.threads == 1:
-        kernel(0, n, *args)
+def for_slots(kernel: Callable[..., None], start: int, stop: int, microseconds_a_slot: float, *args: Any) -> None:
+    """Run ``kernel(start, stop, *args)`` over slots, in threads where the work is worth it."""
+    n = stop - start
+    if n <= LANES or n * microseconds_a_slot < _WORTH_A_THREAD or _pool.threads == 1:
+        kernel(start, stop, *args)
         return
-    blocks = -(-n // LANES)
-    threads = min(_pool.threads, blocks)
-    bounds = [min(n, LANES * (blocks * k // threads)) for k in range(threads + 1)]
+    vectors = -(-n // VECTOR)
+    threads = min(_pool.threads, -(-n // LANES))
+    bounds = [min(stop, start + VECTOR * (vectors * k // threads)) for k in range(threads + 1)]
     others = [_pool.get().submit(kernel, a, b, *args) for a, b in itertools.pairwise(bounds[1:])]
     kernel(bounds[0], bounds[1], *args)
     for other in others:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..evaluation import study
-from ..evaluation.rollout import DIVERGED
+from ..evaluation.guard import DIVERGED
 from ..evaluation.scenario import Scenario
 from ..policies.frozen import Card, MlpPolicy
 from ..typing import Array, Flags

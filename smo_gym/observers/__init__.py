@@ -1,9 +1,10 @@
 """Observers: one a file, all behind the :class:`~smo_gym.observers.protocol.Observer` protocol."""
 
+from .estimator import start_each
 from .oracle import Oracle
-from .protocol import Estimator, Observer, Period
+from .protocol import Estimator, Observer
 from .sliding_mode import Gains, SlidingModeObserver
 
 OBSERVERS = {"smo": SlidingModeObserver, "oracle": Oracle}
 
-__all__ = ["OBSERVERS", "Estimator", "Gains", "Observer", "Oracle", "Period", "SlidingModeObserver"]
+__all__ = ["OBSERVERS", "Estimator", "Gains", "Observer", "Oracle", "SlidingModeObserver", "start_each"]

@@ -1,22 +1,12 @@
 """What an observer is given and what it must answer."""
 
-from typing import NamedTuple, Protocol
+from __future__ import annotations
 
+from typing import Protocol, runtime_checkable
+
+from ..loop import Part
 from ..plant import CartPendulum
 from ..typing import Array, Flags
-
-
-class Period(NamedTuple):
-    """One control period of n slots as a real observer sees it, and the truth for an oracle."""
-
-    y: Array
-    """Measured positions [h, theta] at its start, (2, n)."""
-    samples: Array
-    """Measured positions at each later sampling instant, the last one at its end, (samples, 2, n)."""
-    u: Array
-    """The force in N that was applied, (n,)."""
-    truth: Array
-    """The plants' states at its end, (4, n). Only an oracle reads it."""
 
 
 class Estimator(Protocol):
@@ -27,12 +17,26 @@ class Estimator(Protocol):
         """The estimates [h, theta, h', theta'], (4, n), a copy."""
         ...
 
-    def reset(self, slots: Flags, truth: Array) -> None:
-        """Start the marked slots, (n,), anew. Only an oracle reads the plants' states ``truth``, (4, n)."""
+    def reset(self, slots: Flags, y: Array) -> None:
+        """Start the marked slots, (n,), anew where the encoders say ``y`` = [h, theta], (2, n)."""
         ...
 
-    def update(self, period: Period) -> None:
-        """Bring ``xhat`` to the end of a control period."""
+    def update(self, samples: Array, u: Array) -> None:
+        """Bring ``xhat`` to the end of a control period.
+
+        Args:
+            samples: measured positions at its sampling instants, the last one at its end, (samples, 2, n).
+            u: the force in N that was applied, (n,).
+        """
+        ...
+
+
+@runtime_checkable
+class SeesTruth(Protocol):
+    """An estimator that is shown the plants' states: the oracle's alone."""
+
+    def see(self, slots: Flags, x: Array) -> None:
+        """Show the states ``x`` (4, n) of the marked slots, after each reset and update."""
         ...
 
 
@@ -47,4 +51,13 @@ class Observer(Protocol):
         Raises:
             ValueError: the observer cannot work with these.
         """
+        ...
+
+
+@runtime_checkable
+class Compiled(Protocol):
+    """An observer whose work is a block, so that it runs inside of the compiled loop."""
+
+    def part(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Part:
+        """What it puts into a loop of n slots; arguments and errors as of :meth:`Observer.start`."""
         ...

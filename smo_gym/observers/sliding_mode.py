@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
@@ -13,17 +13,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..article import OBSERVER_GAINS
-from ..kernels import inlined, kernel
-from ..kernels.batch import LANES, for_slots, load, store
+from ..kernels import inlined
+from ..kernels.batch import LANES
+from ..kernels.blocks import XHAT, Y0, U, Y, at, block, four, offsets, put_four, put_two, two
 from ..kernels.cart_pendulum import drift_and_gain
 from ..kernels.elementary import tanh
 from ..kernels.rk4 import rk4
+from ..loop import Part, columns
 from ..plant import CartPendulum
-from ..typing import Array, Flags
+from ..typing import Array
 from ..validation import array, choice, mapping, multiple, number, shape_of, short, switch
-from .protocol import Period
+from .estimator import Compiling
 
-_MICROSECONDS_A_STEP = 0.035
 # tanh(k e) with a slope this steep is sgn(e) for every e that is not 0, and 0 for e = 0.
 _EXACT = 1e300
 # RK4 is stable for x' = -r x up to r dt = 2.785 (the real root of 1 + z/2 + z^2/6 + z^3/24).
@@ -74,7 +75,7 @@ class Gains:
 
 
 @dataclass(frozen=True, slots=True)
-class SlidingModeObserver:
+class SlidingModeObserver(Compiling):
     """Estimates the state from sampled positions, the applied force, nominal parameters and gains.
 
     ::
@@ -148,33 +149,19 @@ class SlidingModeObserver:
         """The settings by name, of plain types, as the constructor takes them."""
         return asdict(self)
 
-    def start(self, n: int, dt: float, force: float, nominal: CartPendulum) -> _Bank:
-        """An estimator of n slots, all with these settings.
+    def part(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Part:
+        """What it puts into a loop of n slots.
 
         Raises:
             ValueError: the step does not divide ``dt`` or is too large for the gains (with the largest that works).
         """
-        return self.start_each([self] * n, dt, force, nominal)
-
-    @staticmethod
-    def start_each(observers: Sequence[SlidingModeObserver], dt: float, force: float, nominal: CartPendulum) -> _Bank:
-        """An estimator whose slot i has the settings of ``observers[i]``.
-
-        Raises:
-            ValueError: as :meth:`start`; or the observers differ in step or model.
-        """
-        first = observers[0]
-        if any(o.step != first.step or o.model != first.model for o in observers):
-            raise ValueError("observers in one batch must have the same step and model")
-        distinct = {id(o): o for o in observers}
-        steps = {key: o._steps(dt, force) for key, o in distinct.items()}[id(first)]
-        columns = {key: o._column(dt / steps) for key, o in distinct.items()}
-        return _Bank(
-            xhat0=np.stack([o.xhat0 for o in observers], axis=1),
-            settings=np.ascontiguousarray(np.stack([columns[id(o)] for o in observers], axis=1)),
-            nominal=(first.model or nominal).as_array(),
-            dt=dt,
-            steps=steps,
+        steps = self._steps(dt, force)
+        model = (self.model or nominal).as_array()
+        return Part(
+            columns(n, 0.0, 0.0, self._column(dt / steps), model, steps, dt / steps),
+            sample=_estimate,
+            xhat=columns(n, np.array(self.xhat0)),
+            alike=(float(steps), dt / steps),
         )
 
     def _steps(self, dt: float, force: float) -> int:
@@ -207,39 +194,11 @@ def _is_slope(k: Any) -> bool:
     return isinstance(k, numbers.Real) and bool(k == math.inf or 0.0 < k <= sys.float_info.max)  # type: ignore[operator]
 
 
-class _Bank:
-    """Sliding mode observers at work, one a slot."""
-
-    def __init__(self, xhat0: Array, settings: Array, nominal: Array, dt: float, steps: int) -> None:
-        self._settings, self._nominal, self._dt, self._steps = settings, nominal, dt, steps
-        self._initial = np.concatenate([xhat0, np.zeros((2, xhat0.shape[1]))])  # rows xhat and psi2
-        self._state = self._initial.copy()
-
-    @property
-    def xhat(self) -> Array:
-        return self._state[:4].copy()
-
-    def reset(self, slots: Flags, truth: Array) -> None:
-        self._state[:, slots] = self._initial[:, slots]
-
-    def update(self, period: Period) -> None:
-        for_slots(
-            _observe,
-            self._state.shape[1],
-            _MICROSECONDS_A_STEP * self._steps * len(period.samples),
-            self._state,
-            period.y,
-            period.samples,
-            period.u,
-            self._settings,
-            self._nominal,
-            self._steps,
-            self._dt,
-        )
+PSI, M1, BETA_1, BETA_2, SLOPES, ALPHA, MODEL, STEPS, STEP, _ = offsets(2, 2, 2, 2, 2, 1, 4, 1, 1)
 
 
 @inlined
-def _estimate(
+def _derivative(
     xhat: tuple[float, float, float, float], s: float, inputs: tuple[float, ...]
 ) -> tuple[float, float, float, float]:
     """Xhat' of (34)-(35), the measurement on the line between two samples."""
@@ -255,69 +214,20 @@ def _estimate(
     return h_dot, theta_dot, v_dot, omega_dot
 
 
-@kernel
-def _observe(
-    start: int,
-    stop: int,
-    state: Array,
-    y: Array,
-    samples: Array,
-    u: Array,
-    settings: Array,
-    nominal: Array,
-    steps: int,
-    dt: float,
-) -> None:
-    """In place; rows of the workspace: state 0-5, two samples 6-9, force 10, settings 11-19."""
-    W = LANES
-    work = np.empty(20 * W)
-    force = u.reshape((1, u.size))
-    M_c, m, l, g = nominal
-    h = dt / steps
-    for first in range(start, stop, LANES):
-        lanes = min(LANES, stop - first)
-        load(work, 0, state, first, lanes)
-        load(work, 8, y, first, lanes)
-        load(work, 10, force, first, lanes)
-        load(work, 11, settings, first, lanes)
-        for k in range(samples.shape[0]):
-            for i in range(2 * W):
-                work[6 * W + i] = work[8 * W + i]
-            load(work, 8, samples[k], first, lanes)
-            for j in range(steps):
-                a, b = j / steps, (j + 1) / steps
-                for i in range(lanes):
-                    h0, theta0 = work[6 * W + i], work[7 * W + i]
-                    dh, dtheta = work[8 * W + i] - h0, work[9 * W + i] - theta0
-                    force_i, alpha = work[10 * W + i], work[19 * W + i]
-                    size = abs(force_i)
-                    xhat = (work[i], work[W + i], work[2 * W + i], work[3 * W + i])
-                    inputs = (
-                        h0 + a * dh,
-                        theta0 + a * dtheta,
-                        h0 + b * dh,
-                        theta0 + b * dtheta,
-                        force_i,
-                        work[11 * W + i],
-                        work[12 * W + i],
-                        work[13 * W + i] + work[15 * W + i] * size,
-                        work[14 * W + i] + work[16 * W + i] * size,
-                        work[17 * W + i],
-                        work[18 * W + i],
-                        alpha,
-                        work[4 * W + i],
-                        work[5 * W + i],
-                        M_c,
-                        m,
-                        l,
-                        g,
-                    )
-                    x0, x1, x2, x3 = rk4(_estimate, xhat, inputs, h)
-                    # the low-pass sees the mean injection over the step
-                    work[4 * W + i] += alpha * ((x0 - xhat[0]) / h - work[4 * W + i])
-                    work[5 * W + i] += alpha * ((x1 - xhat[1]) / h - work[5 * W + i])
-                    work[i] = x0
-                    work[W + i] = x1
-                    work[2 * W + i] = x2
-                    work[3 * W + i] = x3
-        store(work, 0, state, first, lanes)
+@block
+def _estimate(signals: Array, own: Array, lanes: int) -> None:
+    steps, step = int(own[STEPS * LANES]), own[STEP * LANES]
+    for j in range(steps):
+        a, b = j / steps, (j + 1) / steps
+        for i in range(lanes):
+            (h0, theta0), (h1, theta1), u = two(signals, Y0, i), two(signals, Y, i), at(signals, U, i)
+            dh, dtheta = h1 - h0, theta1 - theta0
+            m1, beta_1, beta_2, k = two(own, M1, i), two(own, BETA_1, i), two(own, BETA_2, i), two(own, SLOPES, i)
+            m2 = beta_1[0] + beta_2[0] * abs(u), beta_1[1] + beta_2[1] * abs(u)
+            alpha, psi, model, xhat = at(own, ALPHA, i), two(own, PSI, i), four(own, MODEL, i), four(signals, XHAT, i)
+            line = h0 + a * dh, theta0 + a * dtheta, h0 + b * dh, theta0 + b * dtheta
+            new = rk4(_derivative, xhat, (*line, u, *m1, *m2, *k, alpha, *psi, *model), step)
+            # the low-pass sees the mean injection over the step
+            mean = (new[0] - xhat[0]) / step, (new[1] - xhat[1]) / step
+            put_two(own, PSI, i, (psi[0] + alpha * (mean[0] - psi[0]), psi[1] + alpha * (mean[1] - psi[1])))
+            put_four(signals, XHAT, i, new)

@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 
 from ..typing import Array
 from ..validation import choice
-from .observer import ObserverWrapper, VectorObserverWrapper, task_of
+from .inside import task_of
+from .observer import ObserverWrapper
+from .vector_observer import VectorObserverWrapper
 
 Single = NDArray[np.float32]
 

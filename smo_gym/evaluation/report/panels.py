@@ -12,9 +12,9 @@ from scipy.ndimage import uniform_filter1d
 
 from ...typing import Array
 from ..formats import mathtext
-from ..rollout import Traces
 from ..statistics import Result
 from ..study import Outcome
+from ..traces import Traces
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

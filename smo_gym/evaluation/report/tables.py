@@ -10,9 +10,8 @@ from dataclasses import asdict, fields, replace
 import numpy as np
 
 from ...article import Cell
-from .. import formats, verdicts
+from .. import formats, metrics, verdicts
 from ..formats import as_csv
-from ..metrics import NAMES
 from ..statistics import Result
 from ..study import ARMS, Outcome
 
@@ -152,14 +151,14 @@ def results_csv(results: Sequence[Result]) -> str:
 
 def runs_csv(outcomes: Sequence[Outcome]) -> str:
     """One line a run, with every metric."""
-    header = ["table", "controller", "uncertainty", "case", "arm", "run", "failed", *NAMES]
+    header = ["table", "controller", "uncertainty", "case", "arm", "run", "failed", *metrics.names()]
 
     def lines() -> Iterable[list[object]]:
         for outcome in outcomes:
             group = outcome.group
             place = [group.scenario.table, group.name, group.uncertainty, group.case, group.arm]
             for run, failed in enumerate(outcome.failed):
-                yield [*place, run, int(failed), *(exact(outcome.metrics[name][run]) for name in NAMES)]
+                yield [*place, run, int(failed), *(exact(outcome.metrics[name][run]) for name in metrics.names())]
 
     return as_csv(header, lines())
 

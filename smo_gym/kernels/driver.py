@@ -1,0 +1,82 @@
+"""The closed loop, compiled once: it calls the blocks of a program and does not know what they are."""
+
+import numpy as np
+
+from ..typing import Array
+from . import kernel
+from .batch import LANES, VECTOR, load, store
+from .blocks import ALIVE, FAILED, XD, Y0, X, Y, call
+
+_LOOK = 16
+"""After every so many control periods a block of slots that have all ended is left."""
+
+
+@kernel
+def drive(
+    start: int,
+    stop: int,
+    rows: Array,
+    act: Array,
+    sample: Array,
+    close: Array,
+    begin: int,
+    end: int,
+    substeps: int,
+    reference: Array,
+    recording: Array,
+    positions: Array,
+    measured: Array,
+) -> None:
+    """Control periods ``begin`` to ``end`` of slots ``start`` to ``stop``.
+
+    Args:
+        start: first slot.
+        stop: one behind the last.
+        rows: (rows, n), signals first, then each part's own; in place.
+        act: what is called when a control period begins, (blocks, 3): address, first of its own rows, one behind them.
+        sample: what is called at every sampling instant.
+        close: what is called when the period ends.
+        begin: first control period.
+        end: one behind the last.
+        substeps: sampling instants of a period.
+        reference: x_d at each sampling instant from the very first on, (instants, 4), alike in all slots; or empty.
+        recording: measurements in place of a sensor's, (substeps, 2, n), of a single period; or empty.
+        positions: filled with the true positions of the last period, (substeps, 2, n); or empty.
+        measured: filled with its measurements, (substeps, 2, n); or empty.
+    """
+    work = np.empty(rows.shape[0] * LANES)
+    for first in range(start, stop, LANES):
+        lanes = min(LANES, stop - first)
+        # lanes that fill a vector repeat the first slot and are never stored: a scalar rest costs more
+        width = lanes if lanes == 1 else (lanes + VECTOR - 1) // VECTOR * VECTOR
+        load(work, 0, rows, first, lanes, width)
+        for k in range(begin, end):
+            for p in range(act.shape[0]):
+                call(act[p, 0], work, work[act[p, 1] * LANES : act[p, 2] * LANES], width)
+            for j in range(substeps):
+                if reference.shape[0] > 0:
+                    for r in range(4):
+                        for i in range(width):
+                            work[(XD + r) * LANES + i] = reference[k * substeps + j + 1, r]
+                if recording.shape[0] > 0:
+                    for i in range(2 * LANES):
+                        work[Y0 * LANES + i] = work[Y * LANES + i]
+                    load(work, Y, recording[j], first, lanes, width)
+                for p in range(sample.shape[0]):
+                    call(sample[p, 0], work, work[sample[p, 1] * LANES : sample[p, 2] * LANES], width)
+                if positions.shape[0] > 0:
+                    store(work, X, positions[j], first, lanes)
+                if measured.shape[0] > 0:
+                    store(work, Y, measured[j], first, lanes)
+            for p in range(close.shape[0]):
+                call(close[p, 0], work, work[close[p, 1] * LANES : close[p, 2] * LANES], width)
+            for i in range(width):
+                going = work[ALIVE * LANES + i]
+                work[ALIVE * LANES + i] = 0.0 if work[FAILED * LANES + i] > 0.0 else going
+            if k % _LOOK == 0:
+                alive = 0.0
+                for i in range(width):
+                    alive += work[ALIVE * LANES + i]
+                if alive == 0.0:
+                    break
+        store(work, 0, rows, first, lanes)

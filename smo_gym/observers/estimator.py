@@ -1,0 +1,110 @@
+"""Estimators of arrays of measurements, without any environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..loop import Loop, Part, side_by_side
+from ..plant import CartPendulum
+from ..typing import Array, Flags
+from .protocol import Compiled, Estimator, Observer
+
+
+class Compiling:
+    """For observers that have a ``part``: the estimator that runs it."""
+
+    __slots__ = ()
+
+    def start(self: Compiled, n: int, dt: float, force: float, nominal: CartPendulum) -> BlockEstimator:
+        """An estimator of n slots; arguments and errors as of :meth:`~smo_gym.observers.protocol.Observer.start`."""
+        return BlockEstimator([self.part(n, dt, force, nominal)], n)
+
+
+class BlockEstimator:
+    """An observer's block at work on measurements that are handed in."""
+
+    def __init__(self, parts: Sequence[Part], n: int) -> None:
+        self._n, self._parts = n, parts
+        self._loop = Loop(n, 1, {"observer": parts})
+        self._loop.start(slice(None), np.zeros((4, n)))
+
+    @property
+    def xhat(self) -> Array:
+        """The estimates (4, n), a copy."""
+        return self._loop.xhat.copy()
+
+    def reset(self, slots: Flags, y: Array) -> None:
+        """Start the marked slots anew."""
+        x = np.concatenate([y, np.zeros_like(y)])
+        self._loop.start(slots, x[:, slots])
+
+    def update(self, samples: Array, u: Array) -> None:
+        """Bring the estimates to the end of a control period."""
+        self._loop.substeps = len(samples)
+        self._loop.u[:] = u
+        self._loop.run(recording=np.ascontiguousarray(samples))
+
+
+class Several:
+    """Estimators of neighbouring slots as one."""
+
+    def __init__(self, each: Sequence[tuple[slice, Estimator]]) -> None:
+        self._each = each
+
+    @property
+    def xhat(self) -> Array:
+        """The estimates (4, n), a copy."""
+        return np.hstack([estimator.xhat for _, estimator in self._each])
+
+    def reset(self, slots: Flags, y: Array) -> None:
+        """Start the marked slots anew."""
+        for mine, estimator in self._each:
+            estimator.reset(slots[mine], y[:, mine])
+
+    def update(self, samples: Array, u: Array) -> None:
+        """Bring the estimates to the end of a control period."""
+        for mine, estimator in self._each:
+            estimator.update(np.ascontiguousarray(samples[:, :, mine]), u[mine])
+
+    def see(self, slots: Flags, x: Array) -> None:
+        """Show the states to those that see them."""
+        for mine, estimator in self._each:
+            if (see := getattr(estimator, "see", None)) is not None:
+                see(slots[mine], x[:, mine])
+
+
+def parts_of(observers: Sequence[Observer], dt: float, force: float, nominal: CartPendulum) -> list[Part] | None:
+    """What observers, one a slot, put into a loop, equal kinds as one; None where one of them is not compiled.
+
+    Raises:
+        ValueError: an observer cannot work with these.
+    """
+    distinct = {id(observer): observer for observer in observers}
+    if not all(isinstance(observer, Compiled) for observer in distinct.values()):
+        return None
+    parts = {
+        key: observer.part(1, dt, force, nominal)
+        for key, observer in distinct.items()
+        if isinstance(observer, Compiled)
+    }
+    return side_by_side(parts[id(observer)] for observer in observers)
+
+
+def start_each(observers: Sequence[Observer], dt: float, force: float, nominal: CartPendulum) -> Estimator:
+    """An estimator whose slot i is ``observers[i]``'s, of any kinds.
+
+    Raises:
+        ValueError: an observer cannot work with these.
+    """
+    parts = parts_of(observers, dt, force, nominal)
+    if parts is not None:
+        return BlockEstimator(parts, len(observers))
+    each: list[tuple[slice, Estimator]] = []
+    start = 0
+    for stop in range(1, len(observers) + 1):
+        if stop == len(observers) or observers[stop] is not observers[start]:
+            each.append((slice(start, stop), observers[start].start(stop - start, dt, force, nominal)))
+            start = stop
+    return Several(each)

@@ -1,0 +1,175 @@
+"""What an observer stands on: which observer, around which environment, and how it is at work there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any, cast
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv, VectorObservationWrapper, VectorWrapper
+
+from ..envs.pendulum import PendulumEnv
+from ..envs.task import Task, plain_data
+from ..envs.vector import PendulumVectorEnv
+from ..loop import Loop
+from ..observers import OBSERVERS, Estimator, Observer, Oracle, SlidingModeObserver, start_each
+from ..observers.estimator import parts_of
+from ..typing import Array, Flags
+from ..validation import choice, short, unknown
+
+# A force without limit bounds nothing: the step is then checked for the largest that the article's runs reach.
+_USUAL_FORCE = 30.0
+
+
+def make_observer(observer: str | Observer, compensation: bool | None, settings: dict[str, Any]) -> Observer:
+    """An observer by name and settings, or the object itself, which has its own.
+
+    Raises:
+        TypeError: neither a name nor an observer.
+        ValueError: an unknown name or setting, or settings beside an object.
+    """
+    if not isinstance(observer, str):
+        if not hasattr(observer, "start"):
+            raise TypeError(f"observer={observer!r} must be one of {', '.join(map(repr, OBSERVERS))} or an Observer")
+        if settings or compensation is not None:
+            given = [*settings, *["compensation"] * (compensation is not None)]
+            raise ValueError(f"{', '.join(given)} must not be given beside {observer!r}, which has its own settings")
+        return observer
+    cls = OBSERVERS[choice("observer", observer, OBSERVERS)]
+    known = {field.name for field in fields(cls)}
+    for name in settings:
+        if name not in known:
+            raise ValueError(unknown(f"setting of the observer {observer!r}", name, known))
+    if "compensation" in known and compensation is not None:
+        settings = {"compensation": compensation, **settings}
+    return cast(Observer, cls(**settings))
+
+
+def named(observer: Any, compensation: bool | None, settings: dict[str, Any]) -> dict[str, Any]:
+    """The constructor's arguments as plain data, so that a spec survives JSON."""
+    if isinstance(observer, SlidingModeObserver):
+        return {"observer": "smo", **plain_data(observer.as_dict())}
+    if isinstance(observer, Oracle):
+        return {"observer": "oracle"}
+    return {"observer": observer, "compensation": compensation, **plain_data(settings)}
+
+
+UNSEEN = (
+    "an observer reads what the encoders measured, info['samples'], and would not see this. Noise, quantisation or "
+    "delay of a sensor belongs into a wrapper inside that changes info['samples'] and the observation alike; a change "
+    "that is meant for the agent alone belongs outside the observer"
+)
+
+
+def task_of(env: Any, batch: bool | None = None) -> Task:
+    """The task of an environment that observes what its task tells and no more.
+
+    Args:
+        env: the environment, scalar or vector.
+        batch: whether it must be the one or the other.
+
+    Raises:
+        TypeError: the environment is not one of this package, or scalar where a vector is wanted, or the reverse.
+        ValueError: its slots have different tasks, or something changes what it observes.
+    """
+    if not isinstance(env, gymnasium.Env | VectorEnv):
+        raise TypeError(f"env={short(env)} must be a smo_gym environment, as gymnasium.make or make_vec gives it")
+    if batch is not None and batch != isinstance(env, VectorEnv):
+        kind = "VectorObserverWrapper (or VectorAgentView)" if not batch else "ObserverWrapper (or agent_view)"
+        raise TypeError(f"{env} is {'one environment' if batch else 'a batch'}: wrap it in {kind}")
+    layer: Any = env
+    while isinstance(layer, gymnasium.Wrapper | VectorWrapper):
+        if isinstance(layer, gymnasium.ObservationWrapper | VectorObservationWrapper):
+            raise ValueError(f"{layer} changes the observation: {UNSEEN}")
+        layer = layer.env
+    base = env.unwrapped
+    many = isinstance(base, SyncVectorEnv | AsyncVectorEnv)
+    try:
+        task, *others = base.get_attr("task") if many else [base.task]  # type: ignore[union-attr]
+    except AttributeError:
+        task, others = None, []
+    if not isinstance(task, Task):
+        raise TypeError(f"{env} is not a smo_gym environment: an observer needs its sampling period and samples")
+    if any(other != task for other in others):
+        raise ValueError(f"{env} has environments with different options: one wrapper serves alike ones")
+    space = env.single_observation_space if isinstance(env, VectorEnv) else env.observation_space
+    if space.shape != task.observation_space.shape:
+        raise ValueError(f"{env} observes {space}: an observer or view must stand inside whatever else changes that")
+    return task
+
+
+def unseen(observation: Array, y: Array) -> ValueError:
+    """What there is to say where the observation is not what the encoders measured."""
+    return ValueError(f"the environment observes {short(observation)} where {short(y)} was measured: {UNSEEN}")
+
+
+def lost_of(xhat: Array) -> Flags | None:
+    """Which estimates (4, n) are not finite, (n,); None where all are."""
+    finite = np.isfinite(xhat)
+    return None if np.count_nonzero(finite) == finite.size else np.asarray(~finite.all(axis=0))
+
+
+def space_of(inner: spaces.Space[Any]) -> spaces.Space[Array]:
+    """Of observations to which an estimate is appended."""
+    assert isinstance(inner, spaces.Box)
+    return spaces.Box(-np.inf, np.inf, (*inner.shape[:-1], inner.shape[-1] + 4), np.float64)
+
+
+def at_work(env: Any, observers: Sequence[Observer]) -> Estimator:
+    """Observers, one a slot, at work on an environment: inside of its loop where they are compiled and it has one.
+
+    A wrapper of the user's own between the two may change what the encoders measured, in the observation and
+    ``info["samples"]`` alike; what stands in the loop would not see it.
+
+    Raises:
+        ValueError: an observer cannot work with this environment.
+    """
+    task = task_of(env)
+    force = task.force_limit if np.isfinite(task.force_limit) else _USUAL_FORCE
+    plant = (task.dt, force, task.params)
+    layer, ours = env, True
+    while isinstance(layer, gymnasium.Wrapper | VectorWrapper):
+        ours &= type(layer).__module__.startswith("gymnasium.")
+        layer = layer.env
+    if ours and isinstance(layer, PendulumEnv | PendulumVectorEnv):
+        parts = parts_of(observers, *plant)
+        if parts is not None:
+            layer.plug(parts)
+            sees = any(isinstance(observer, Oracle) for observer in observers)
+            return Oracular(layer.loop, observers) if sees else Plugged(layer.loop)
+    return start_each(observers, *plant)
+
+
+class Plugged:
+    """Observers that work inside of an environment's loop: stepping it has updated them."""
+
+    def __init__(self, loop: Loop) -> None:
+        self.loop = loop
+
+    @property
+    def xhat(self) -> Array:
+        """The estimates (4, n), a copy."""
+        return self.loop.xhat.copy()
+
+    def reset(self, slots: Flags, y: Array) -> None:
+        """Start the marked slots anew, where the loop's encoders are."""
+        self.loop.restart("observer", slots)
+
+    def update(self, samples: Array, u: Array) -> None:
+        """Nothing is left to do."""
+
+
+class Oracular(Plugged):
+    """Some of the observers see the truth: at a reset, too, which the loop's blocks do not."""
+
+    def __init__(self, loop: Loop, observers: Sequence[Observer]) -> None:
+        super().__init__(loop)
+        self._oracles = np.array([isinstance(observer, Oracle) for observer in observers])
+
+    def see(self, slots: Flags, x: Array) -> None:
+        """Show the states of the marked slots."""
+        seen = slots & self._oracles
+        self.loop.xhat[:, seen] = x[:, seen]
