@@ -1,34 +1,15 @@
 """What the feedback laws share: where an observation holds the estimate, and the checks of weights."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import inlined
-from ..kernels.blocks import XD, XHAT, four
 from ..loop import Loop, Part
 from ..plant import CartPendulum
-from ..typing import Array, Flags, State
+from ..typing import Array, Flags
 from ..validation import array, number, observed, shape_of, short
-
-_TWO_PI = 2.0 * math.pi
-_ROUND = 6755399441055744.0  # adding 1.5 * 2**52 and taking it away rounds to a whole number
-
-
-@inlined
-def error(signals: Array, i: int, wrap: float) -> State:
-    """What a law should bring to zero, xhat - x_d in lane i.
-
-    With ``wrap`` = 1 the error of the angle is the one within half a turn: an encoder goes on counting, and a rod that
-    has turned is where it was.
-    """
-    xhat, x_d = four(signals, XHAT, i), four(signals, XD, i)
-    angle = xhat[1] - x_d[1]
-    turns = wrap * ((angle / _TWO_PI + _ROUND) - _ROUND)
-    return xhat[0] - x_d[0], angle - _TWO_PI * turns, xhat[2] - x_d[2], xhat[3] - x_d[3]
 
 
 def told(observation: ArrayLike) -> tuple[Array, Array]:

@@ -9,11 +9,11 @@ from numpy.linalg import LinAlgError
 from numpy.typing import ArrayLike
 from scipy.linalg import solve_continuous_are
 
-from ..kernels.blocks import U, at, block, four, offsets, put
+from ..kernels.blocks import U, at, block, error, four, offsets, put
 from ..loop import Part, columns
 from ..typing import Array
 from ..validation import array, shape_of, short, switch
-from .feedback import Feedback, error, nominal, weights
+from .feedback import Feedback, nominal, weights
 
 _SLOWEST = 1e-6  # of the fastest pole's size: nearer to the axis a pole is on it, but for rounding
 

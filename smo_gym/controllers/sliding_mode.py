@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..article import SMC_GAINS
-from ..kernels.blocks import U, at, block, four, offsets, put
+from ..kernels.blocks import U, at, block, error, four, offsets, put
 from ..kernels.elementary import sincos, tanh
 from ..loop import Part, columns
 from ..typing import Array
 from ..validation import array, number, shape_of, short, switch
-from .feedback import Feedback, error
+from .feedback import Feedback
 
 INTEGRAL, GAINS, SLOPE, AMPLITUDE, LAM, PI_OVER_EPSILON, PERIOD, WRAP, _ = offsets(1, 4, 1, 1, 1, 1, 1, 1)
 

@@ -160,7 +160,7 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
             raise ValueError(f"action={short(action)} has shape {wanted.shape}, it must have shape (1,)")
         force = wanted.item()
         if not math.isfinite(force):
-            raise ValueError(f"action={force} must be finite")
+            raise ValueError(f"action={force} (slot 0) must be finite")
         self._steps_left -= 1
         k = self._steps - self._steps_left
         loop, samples = self.loop, np.empty((self._substeps, 2, 1))

@@ -81,6 +81,23 @@ def finite(values: State) -> bool:
     return (a - a) + (b - b) + (c - c) + (d - d) == 0.0
 
 
+_TWO_PI = 6.283185307179586
+_ROUND = 6755399441055744.0  # adding 1.5 * 2**52 and taking it away rounds to a whole number
+
+
+@inlined
+def error(signals: Array, i: int, wrap: float) -> State:
+    """What a law should bring to zero, xhat - x_d in lane i.
+
+    With ``wrap`` = 1 the error of the angle is the one within half a turn: an encoder goes on counting, and a rod that
+    has turned is where it was.
+    """
+    xhat, x_d = four(signals, XHAT, i), four(signals, XD, i)
+    angle = xhat[1] - x_d[1]
+    turns = wrap * ((angle / _TWO_PI + _ROUND) - _ROUND)
+    return xhat[0] - x_d[0], angle - _TWO_PI * turns, xhat[2] - x_d[2], xhat[3] - x_d[3]
+
+
 SIGNATURE = types.void(types.float64[::1], types.float64[::1], types.int64)
 _interpreted: dict[int, Block] = {}
 

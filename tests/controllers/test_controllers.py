@@ -119,7 +119,7 @@ def test_stable_baselines3_evaluates_a_law(law):
             "slope=-1.0 must be positive, one number or one a slot",
         ),
         (lambda: LQR([1, 1, 1, 1]).predict(np.zeros((3, 2))), "wrap the environment in smo_gym.ObserverWrapper"),
-        (lambda: LQR(np.ones((3, 4))).predict(np.zeros((5, 6))), r"K has 3 slots, the observation has shape \(5, 6\)"),
+        (lambda: LQR(np.ones((3, 4))).predict(np.zeros((5, 6))), "K has 3 slots, the observation has 5"),
         (lambda: LQR("abc"), "K has shape"),
         (lambda: LQR.design("abc", 1.0), "Q='abc' must be an array of numbers"),
         (

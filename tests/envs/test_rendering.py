@@ -109,7 +109,7 @@ def test_the_force_is_an_arrow():
         frame, env = frame_of(force=force)
         _, columns = pixels(frame, rendering.FORCE)
         assert np.ptp(columns) == pytest.approx(abs(force) / 30 * 1.5 * WIDTH / 8, rel=0.05)  # of eight rods
-        cart = WIDTH / 2 + WIDTH / (8 * 0.44) * env._x[0, 0]
+        cart = WIDTH / 2 + WIDTH / (8 * 0.44) * env.loop.x[0, 0]
         assert (columns > cart).all() if force > 0 else (columns < cart).all()
     assert not pixels(frame_of(force=0.0)[0], rendering.FORCE)[0].size
 

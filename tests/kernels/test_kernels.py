@@ -11,7 +11,7 @@ import smo_gym
 from smo_gym.kernels import elementary, interpreted
 from smo_gym.kernels.batch import LANES
 from smo_gym.kernels.elementary import sincos, tanh
-from smo_gym.observers import Period, SlidingModeObserver
+from smo_gym.observers import SlidingModeObserver
 from smo_gym.plant import CartPendulum, advance
 
 
@@ -54,9 +54,9 @@ def _batch(n, steps=5):
     u = np.array([rng.uniform(-30.0, 30.0) for rng in draws])
     estimator = SlidingModeObserver().start(n, 0.001, 30.0, CartPendulum())
     samples = np.empty((steps, 2, n))
-    y = x[:2].copy()
+    estimator.reset(np.ones(n, dtype=np.bool_), x[:2])
     advance(x, params, u, 0.001, samples)
-    estimator.update(Period(y, samples, u, x))
+    estimator.update(samples, u)
     return x, estimator.xhat
 
 

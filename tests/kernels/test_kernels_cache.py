@@ -35,7 +35,7 @@ def test_a_change_of_the_equations_is_never_hidden_by_the_cache(tmp_path):
         return _probe(tmp_path).stdout
 
     before = run()
-    assert list((tmp_path / "smo_gym" / "__pycache__").glob("plant._advance*.nbc"))
+    assert list((tmp_path / "smo_gym" / "__pycache__").glob("plant._step*.nbc"))
     assert run() == before
     equations = tmp_path / "smo_gym" / "kernels" / "cart_pendulum.py"
     changed = equations.read_text().replace("(M_c + m) * g * sin", "(M_c + 2 * m) * g * sin")

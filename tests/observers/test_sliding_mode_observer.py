@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from smo_gym import LQR, CartPendulum, Gains, ObserverWrapper, SlidingModeObserver
-from smo_gym.observers import Period
+from smo_gym.observers import start_each
 
 DT = 0.001
 
@@ -51,7 +51,8 @@ SAMPLES = np.array([[0.31, -0.82], [0.312, -0.817], [0.315, -0.812], [0.319, -0.
 def update(observer, u, samples=SAMPLES, xhat0=None):
     """xhat after a period of as many samples as follow the first."""
     estimator = (replace(observer, xhat0=xhat0) if xhat0 is not None else observer).start(1, DT, 30.0, CartPendulum())
-    estimator.update(Period(samples[0][:, None], samples[1:, :, None].copy(), np.array([u]), np.zeros((4, 1))))
+    estimator.reset(np.array([True]), samples[0][:, None])
+    estimator.update(samples[1:, :, None], np.array([u]))
     return estimator.xhat[:, 0]
 
 
@@ -102,9 +103,11 @@ def test_compensation_is_the_part_of_the_gain_in_the_force():
 
 def test_each_slot_may_have_its_own_settings():
     observers = [SlidingModeObserver(compensation=c, slopes=(s, s)) for c in (True, False) for s in (10.0, 14.0)]
-    bank = SlidingModeObserver.start_each(observers, DT, 30.0, CartPendulum())
-    y = np.repeat(SAMPLES[0][:, None], 4, axis=1)
-    bank.update(Period(y, np.repeat(SAMPLES[1:, :, None], 4, axis=2), np.full(4, 5.0), np.zeros((4, 4))))
+    observers += [SlidingModeObserver(step=DT / 2), SlidingModeObserver(model=CartPendulum(4.0))]
+    n = len(observers)
+    bank = start_each(observers, DT, 30.0, CartPendulum())
+    bank.reset(np.ones(n, dtype=np.bool_), np.repeat(SAMPLES[0][:, None], n, axis=1))
+    bank.update(np.repeat(SAMPLES[1:, :, None], n, axis=2), np.full(n, 5.0))
     for i, observer in enumerate(observers):
         assert (bank.xhat[:, i] == update(observer, 5.0)).all()
 
@@ -235,10 +238,3 @@ def test_bad_settings_are_named(settings, message):
 def test_the_step_divides_the_sampling_period():
     with pytest.raises(ValueError, match="must be a whole multiple of step=0.0003"):
         SlidingModeObserver(step=0.0003).start(1, DT, 30.0, CartPendulum())
-
-
-def test_slots_of_one_batch_share_step_and_model():
-    with pytest.raises(ValueError, match="same step and model"):
-        SlidingModeObserver.start_each(
-            [SlidingModeObserver(), SlidingModeObserver(step=0.0005)], DT, 30.0, CartPendulum()
-        )
