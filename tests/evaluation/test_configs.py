@@ -20,7 +20,7 @@ def test_every_file_is_found_by_its_name():
 
 def test_an_installed_package_has_them_inside(tmp_path, monkeypatch):
     shipped = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
-    assert shipped["force-include"] == {"configs": "smo_gym/configs"}
+    assert shipped == {"only-include": ["smo_gym", "configs"], "sources": {"configs": "smo_gym/configs"}}
     (tmp_path / "smo_gym" / "evaluation").mkdir(parents=True)
     monkeypatch.setattr(configs, "__file__", str(tmp_path / "smo_gym" / "evaluation" / "configs.py"))
     assert configs.folder() == tmp_path / "configs"
