@@ -24,7 +24,8 @@ def program() -> str | None:
     looked_for = typed == "-m" and f" {MODULE.partition(' ')[2]} " in f"{' '.join(sys.orig_argv)} "
     if looked_for or file == _PACKAGE / "__main__.py":
         return MODULE
-    return file.name if file.parent == _PACKAGE.parent / "agents" else None
+    in_agents = file.parent == _PACKAGE.parent / "agents" and (_PACKAGE / "cli" / file.name).is_file()
+    return file.name if in_agents else None
 
 
 def called(command: str = "") -> str:

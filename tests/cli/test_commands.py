@@ -70,7 +70,7 @@ def test_messages_have_the_name_that_was_typed(script, start, name, line):
 
 
 def test_in_another_program_a_command_has_its_name_of_smo_gym(monkeypatch, capsys):
-    for program in ("/usr/bin/pytest", "", "/somewhere/agents/evaluate.py"):
+    for program in ("/usr/bin/pytest", "", "/somewhere/agents/train.py", str(ROOT / "agents" / "my_own.py")):
         monkeypatch.setattr(sys, "argv", [program])
         assert starting.program() is None
         assert not starting.is_command()
