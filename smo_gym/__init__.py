@@ -7,6 +7,11 @@ Importing registers three environments, each scalar and natively vectorised:
 - ``SMOPendulumTracking-v0``: the article's plant and a minimum-energy reference to follow.
 """
 
+from .cli import starting
+
+if starting.is_command():  # before the imports below, which take seconds
+    starting.begin()
+
 import gymnasium
 
 from .controllers import LQR, SlidingModeController

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from smo_gym import LQR, CartPendulum, Gains, SlidingModeController, SlidingModeObserver, theorem
+from smo_gym.evaluation import configs
 from smo_gym.evaluation.theorem_on_runs import converge
 from smo_gym.theorem import OperatingSet
 
@@ -185,7 +186,7 @@ def test_the_command(tmp_path):
         ("[-0.5, -0.5,", "[0.6, -0.5,", "the set of initial states holds no point"),
         ("settle: {value: 2.0", "settle: {value: 9.0", "settle=9.0 must lie between 0 and horizon=6.0"),
     )
-    settings = (ROOT / "configs" / "theorem.yaml").read_text()
+    settings = configs.path("theorem").read_text()
     for old, new, message in changes:
         (tmp_path / "bad.yaml").write_text(settings.replace(old, new))
         options = [*command, "--config", str(tmp_path / "bad.yaml")]

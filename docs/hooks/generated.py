@@ -6,8 +6,6 @@ import io
 import math
 import os
 import re
-import runpy
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -18,6 +16,7 @@ import yaml
 from tabulate import tabulate
 
 import smo_gym
+from smo_gym.cli.commands import COMMANDS, main
 from smo_gym.envs.task import HANGING, Task
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,21 +31,17 @@ def on_page_markdown(markdown: str, **kwargs: Any) -> str:
 
 def commands() -> str:
     """The help of every command."""
-    return "\n\n".join(
-        f"## {path.name}\n\n{output(path.name, '--help')}" for path in sorted(ROOT.glob("agents/[!_]*.py"))
-    )
+    return "\n\n".join(f"## smo-gym {name}\n\n{output(name, '--help')}" for name in sorted(COMMANDS))
 
 
 def output(name: str, *arguments: str) -> str:
     """What a command prints."""
-    main, argv = runpy.run_path(str(ROOT / "agents" / name))["main"], sys.argv
     before, shown = os.environ.get("COLUMNS"), io.StringIO()
     try:
-        sys.argv, os.environ["COLUMNS"] = [name], _WIDTH
-        with contextlib.redirect_stdout(shown), contextlib.suppress(SystemExit):
-            main(list(arguments))
+        os.environ["COLUMNS"] = _WIDTH
+        with contextlib.redirect_stdout(shown):
+            main([name, *arguments])
     finally:
-        sys.argv = argv
         os.environ.pop("COLUMNS") if before is None else os.environ.update(COLUMNS=before)
     return f"```text\n{shown.getvalue()}```"
 

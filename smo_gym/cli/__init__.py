@@ -1,1 +1,5 @@
-"""What all commands share: :mod:`entry` (errors, Ctrl-C, exit codes), :mod:`arguments` and :mod:`console`."""
+"""The commands, a module each, and what they share.
+
+:mod:`starting` comes before slow imports, :mod:`commands` finds the command that is wanted, :mod:`entry` has errors,
+Ctrl-C and exit codes; beside them :mod:`arguments`, :mod:`console` and :mod:`progress`.
+"""

@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 
 from .. import __version__
 from ..validation import unknown
+from . import starting
 
 PACKAGES = ("smo_gym", "gymnasium", "numba", "numpy", "scipy")
 DIGITS = 30
@@ -21,18 +22,36 @@ DIGITS = 30
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that raises ValueError, and knows ``--version``.
+    """A parser that raises ValueError, knows ``--version``, and has what several commands have in common.
 
     Args:
-        description: the command's docstring.
+        command: its name.
+        description: its docstring, where ``smo-gym NAME`` stands for what the user typed.
     """
 
-    def __init__(self, description: str | None) -> None:
+    def __init__(self, command: str, description: str | None) -> None:
         super().__init__(
-            description=description, formatter_class=argparse.RawDescriptionHelpFormatter, allow_abbrev=False
+            prog=starting.called(command),
+            description=re.sub(rf"{starting.SCRIPT} (\w+)", lambda found: starting.line(found[1]), description or ""),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
         )
         self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[+-]?\d+)?%?$", re.IGNORECASE)
         self.add_argument("--version", action=_Version, nargs=0, help="say the versions of all that takes part")
+
+    def runs(self, default: int, what: str, note: str = "") -> None:
+        """``--runs``, so many of something random."""
+        told = f"{what} (default {default}{note})"
+        self.add_argument("--runs", type=whole(1), default=default, metavar="N", help=told)
+
+    def seed(self, of: str) -> None:
+        """``--seed``, of something random."""
+        self.add_argument("--seed", type=whole(0), default=0, help=f"of {of} (default 0)")
+
+    def out(self, default: str | None, what: str = "folder") -> None:
+        """``--out``, a folder; None is none."""
+        path, told = Path(default) if default else None, f"{what} (default: {default or 'none'})"
+        self.add_argument("--out", type=Path, default=path, metavar="DIR", help=told)
 
     def error(self, message: str) -> NoReturn:
         """Raise instead of exit: :func:`smo_gym.cli.entry.command` says it."""
@@ -75,7 +94,7 @@ def one_of(what: str, known: Sequence[str]) -> Callable[[str], str]:
 
 class _Flat(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, *_: Any) -> None:
-        setattr(namespace, self.dest, [one for part in values for one in part])
+        setattr(namespace, self.dest, [value for part in values for value in part])
 
 
 def several(kind: Callable[[str], Any]) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import functools
-import os
+import shlex
 import signal
 import sys
 import threading
@@ -12,10 +12,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
+from . import starting
 from .console import guarded
+from .starting import INTERRUPTED
 
 Main = Callable[[Sequence[str] | None], int]
-INTERRUPTED = 130
 
 
 class Stop(Exception):
@@ -26,7 +27,7 @@ class Stop(Exception):
         self.code = code
 
 
-def command(name: str) -> Callable[[Main], Callable[..., int]]:
+def command(of: str) -> Callable[[Main], Callable[..., int]]:
     """Make a function of the arguments a command, which returns its exit code and raises nothing that was foreseen.
 
     0 when all went well; 2 for a bad argument or setting or a missing extra; 1 for what could not be written; 130 when
@@ -34,12 +35,13 @@ def command(name: str) -> Callable[[Main], Callable[..., int]]:
     reader has left.
 
     Args:
-        name: of the file, for messages.
+        of: the command's name; messages have what the user typed to run it.
     """
 
     def decorate(main: Main) -> Callable[..., int]:
         @functools.wraps(main)
         def run(arguments: Sequence[str] | None = None) -> int:
+            name = starting.called(of)
             with guarded() as (output, _), _interruptible(name) as interrupted:
                 code, message = _outcome(main, arguments, interrupted)
                 if message:
@@ -78,6 +80,17 @@ def _outcome(main: Main, arguments: Sequence[str] | None, interrupted: list[bool
         raise
 
 
+def typed(of: str, arguments: Sequence[str] | None) -> str:
+    """The line that runs a command again, in the way that its user ran it.
+
+    Args:
+        of: the command's name.
+        arguments: as given to it; None are those of the process.
+    """
+    given = sys.argv[1:] if arguments is None else arguments
+    return f"{starting.line(of)} {shlex.join(given)}".rstrip()
+
+
 def said(error: OSError) -> str:
     """What went wrong with which file."""
     return f"{error.filename}: {error.strerror}" if error.filename else error.strerror or str(error)
@@ -94,7 +107,7 @@ def _interruptible(name: str) -> Iterator[list[bool]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         if noted:
-            leave(name)
+            starting.leave(name)
         noted.append(True)
         raise KeyboardInterrupt
 
@@ -103,11 +116,3 @@ def _interruptible(name: str) -> Iterator[list[bool]]:
         yield noted
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def leave(name: str) -> None:
-    """End the process at once, with a line."""
-    try:
-        os.write(2, f"{name}: interrupted\n".encode())
-    finally:
-        os._exit(INTERRUPTED)

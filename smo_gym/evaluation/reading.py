@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from reprlib import repr as short
 from typing import Any, TypeVar, get_args
@@ -10,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from .. import files
 from ..validation import unknown
+from . import configs
 
 T = TypeVar("T", bound=BaseModel)
 MOST_FILES = 16
@@ -19,19 +21,31 @@ MOST_FAULTS = 5
 
 
 def read(path: Path, kind: type[T]) -> T:
-    """Settings from a file; ``extends: FILE`` starts from another file beside it.
+    """Settings from a file; ``extends: FILE`` starts from another file beside it, or by its name from one of ours.
 
     Raises:
         ValueError: the file cannot be read, is no YAML, or has an unknown, missing or bad value, named with its place.
     """
     data = _read(path, ())
     try:
+        return validated(data, kind)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+
+
+def validated(data: Mapping[str, Any], kind: type[T]) -> T:
+    """Settings from a mapping.
+
+    Raises:
+        ValueError: an unknown, missing or bad value, named with its place.
+    """
+    try:
         return kind.model_validate(data)
     except ValidationError as error:
         faults = error.errors()
         words = [files.shortened(_explain(fault, kind)) for fault in faults[:MOST_FAULTS]]
         more = [f"and {len(faults) - MOST_FAULTS:,} more"] * (len(faults) > MOST_FAULTS)
-        raise ValueError(f"{path}: {'; '.join([*words, *more])}") from None
+        raise ValueError("; ".join([*words, *more])) from None
 
 
 def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
@@ -44,15 +58,19 @@ def _read(path: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     if not isinstance(base, str):
         raise ValueError(f"{path}: extends={short(base)} must be the name of a file")
     above = (*above, path.resolve())
-    if not (path.parent / base).is_file():
+    found = path.parent / base
+    if not found.is_file() and base in configs.names():
+        found = configs.path(base)
+    if not found.is_file():
         raise ValueError(
-            f"{path}: extends={short(base)} is no file: it must be named as it is found from {path.parent}/"
+            f"{path}: extends={short(base)} is no file: it must be named as it is found from {path.parent}/, or be one "
+            f"of {', '.join(configs.names())}"
         )
-    if (path.parent / base).resolve() in above:
+    if found.resolve() in above:
         raise ValueError(f"{path}: extends itself")
     if len(above) > MOST_FILES:
         raise ValueError(f"{path}: is the {len(above)}th file of a chain of extends, of {MOST_FILES} at most")
-    return _merged(_read(path.parent / base, above), data)
+    return _merged(_read(found, above), data)
 
 
 def _merged(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
@@ -84,13 +102,13 @@ def _fields(place: list[str], kind: type[BaseModel]) -> list[str]:
         found: list[Any] = []
         for kind in kinds:
             field = getattr(kind, "model_fields", {}).get(part)
-            found += _models(field.annotation) if field is not None else [kind]  # a name or a tag: stay
+            found += models(field.annotation) if field is not None else [kind]  # a name or a tag: stay
         kinds = found
     return sorted({name for kind in kinds for name in getattr(kind, "model_fields", {})})
 
 
-def _models(annotation: Any) -> list[Any]:
+def models(annotation: Any) -> list[type[BaseModel]]:
     """All models inside an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
-    return [model for inner in get_args(annotation) for model in _models(inner)]
+    return [model for inner in get_args(annotation) for model in models(inner)]

@@ -16,9 +16,9 @@ from ..controllers import Agent, title
 from ..envs.stepping import checked_force
 from ..envs.task import Task
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
-from ..validation import number
+from ..validation import limit, number
 from ..wrappers import VectorObserverWrapper
-from . import reading
+from . import configs, reading
 from .formats import is_number, line
 from .settings import (
     LONGEST_PERIOD,
@@ -32,15 +32,15 @@ from .settings import (
     PolicySettings,
     ReferenceSettings,
     Setting,
+    Settings,
     State,
-    Strict,
     TheoremSettings,
 )
 
-__all__ = ["ControllerSettings", "Scenario", "Setting", "TheoremSettings", "entered", "load", "load_theorem"]
+__all__ = ["ControllerSettings", "Scenario", "Setting", "TheoremSettings", "entered", "load", "load_theorem", "named"]
 
 
-class Scenario(Strict):
+class Scenario(Settings):
     """One table: its environment, its rows (uncertainty levels times initial states) and its controllers.
 
     ``suffix`` is what the published data appends to a controller's name.
@@ -70,6 +70,14 @@ class Scenario(Strict):
                 f"Python: import {module})"
             )
         return name
+
+    @model_validator(mode="after")
+    def _bounds(self) -> Scenario:
+        for name in ("control_period", "horizon"):
+            number(name, getattr(self, name).value, above=0.0)
+        for name in ("force_limit", "track_limit"):
+            limit(name, getattr(self, name).value)
+        return self
 
     @model_validator(mode="after")
     def _columns(self) -> Scenario:
@@ -169,7 +177,7 @@ def entered(scenarios: Sequence[Scenario], agent: str) -> tuple[list[Scenario], 
 
 
 def load_theorem(path: Path) -> TheoremSettings:
-    """Read and validate the settings of ``agents/theorem.py``.
+    """Read and validate the settings of ``smo-gym theorem``.
 
     Raises:
         ValueError: as :func:`load`.
@@ -187,7 +195,7 @@ def _reference(x0: Four, end: Four, horizon: float, force_limit: float, elements
 
 
 def load(path: Path, wanted: Collection[str] = ("all",)) -> Scenario:
-    """Read and validate a scenario; ``extends: FILE`` starts from another file beside it.
+    """Read and validate a scenario; ``extends: FILE`` starts from another file beside it, or from one of ours.
 
     Args:
         path: of the YAML file.
@@ -202,6 +210,15 @@ def load(path: Path, wanted: Collection[str] = ("all",)) -> Scenario:
     except (ValueError, TypeError, ArithmeticError, ImportError, ReferenceNotFound, gymnasium.error.Error) as error:
         raise ValueError(f"{path}: {files.shortened(str(error))}") from None
     return scenario
+
+
+def named(name: str) -> Scenario:
+    """One of the scenarios that come with the package, such as regulation or tracking.
+
+    Raises:
+        ValueError: there is none of this name.
+    """
+    return load(configs.path(name))
 
 
 def _try(scenario: Scenario, wanted: Collection[str]) -> None:

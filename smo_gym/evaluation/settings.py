@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Generic, Literal, TypeVar
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
@@ -12,6 +12,7 @@ from ..observers import Gains, SlidingModeObserver
 from ..plant import CartPendulum
 from ..policies import named
 from ..theorem import OperatingSet, design, stable
+from . import reading
 
 T = TypeVar("T")
 Four = tuple[float, float, float, float]
@@ -61,7 +62,30 @@ def _again(name: str, values: dict[str, Any], given: set[str]) -> Setting[Any]:
     return _KINDS.get(name, Setting[Any]).model_construct(given, **values)
 
 
-class ObserverSettings(Strict):
+class Settings(Strict):
+    """Settings that belong together, and names."""
+
+    def changed(self, *, note: str = "", **values: Any) -> Self:
+        """The same with other values, chosen ones, checked as if a file had given them.
+
+        Args:
+            note: of the settings that change.
+            **values: by the names of settings, such as ``horizon=5.0``; a name or title is given alike.
+
+        Raises:
+            ValueError: there is no setting of a name, or its value is not allowed.
+        """
+        kinds = {name: reading.models(field.annotation) for name, field in type(self).model_fields.items()}
+        given = {
+            name: {"value": value, "source": "chosen", "note": note}
+            if any(issubclass(kind, Setting) for kind in kinds.get(name, ()))
+            else value
+            for name, value in values.items()
+        }
+        return reading.validated({**dict(self), **given}, type(self))
+
+
+class ObserverSettings(Settings):
     """The sliding mode observer that a controller's tables were made with; see there for the units."""
 
     gains: Setting[str | dict[str, tuple[float, float]]]
@@ -82,7 +106,7 @@ class ObserverSettings(Strict):
         )
 
 
-class LqrSettings(Strict):
+class LqrSettings(Settings):
     """u = -K xhat."""
 
     law: Literal["lqr"]
@@ -95,7 +119,7 @@ class LqrSettings(Strict):
         return LQR(self.K.value, self.wrap.value)
 
 
-class SmcSettings(Strict):
+class SmcSettings(Settings):
     """Equations (49)-(50)."""
 
     law: Literal["smc"]
@@ -114,7 +138,7 @@ class SmcSettings(Strict):
         )
 
 
-class PolicySettings(Strict):
+class PolicySettings(Settings):
     """An agent by its name for :func:`smo_gym.policies.named.load`: of those names, one that runs no code."""
 
     law: Literal["policy"]
@@ -139,7 +163,7 @@ class PolicySettings(Strict):
 ControllerSettings = Annotated[LqrSettings | SmcSettings | PolicySettings, Field(discriminator="law")]
 
 
-class OperatingSetSettings(Strict):
+class OperatingSetSettings(Settings):
     """Bounds of states and estimates, and the level of uncertainty."""
 
     theta: Setting[float]
@@ -147,7 +171,7 @@ class OperatingSetSettings(Strict):
     uncertainty: Setting[Fraction]
 
 
-class DesignSettings(Strict):
+class DesignSettings(Settings):
     """An observer whose gains satisfy (28), (30) and (31) over an operating set."""
 
     operating_set: OperatingSetSettings
@@ -177,7 +201,7 @@ class DesignSettings(Strict):
 
 
 class TheoremSettings(DesignSettings):
-    """The runs that test a design: ``agents/theorem.py``."""
+    """The runs that test a design: ``smo-gym theorem``."""
 
     starts: Setting[tuple[State, State]]
     horizon: Setting[Horizon]
@@ -196,7 +220,7 @@ class TheoremSettings(DesignSettings):
         return self
 
 
-class ReferenceSettings(Strict):
+class ReferenceSettings(Settings):
     """The minimum-energy reference of a tracking scenario, from its initial state, over its horizon."""
 
     end: Setting[State]

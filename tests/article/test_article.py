@@ -1,15 +1,11 @@
 """The published data and the printed constants."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from smo_gym import CartPendulum, article
 from smo_gym.article import consistency
 from smo_gym.evaluation import scenario
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 def cells(**where):
@@ -72,7 +68,7 @@ def test_table_2_is_the_default_plant():
 
 def test_the_scenarios_have_the_printed_levels_cases_and_gains():
     for name, table in (("regulation", "4"), ("initial-conditions", "5")):
-        one = scenario.load(CONFIGS / f"{name}.yaml")
+        one = scenario.named(name)
         assert {f"{100 * x:g}" for x in one.uncertainty.value} >= {
             c.uncertainty_percent for c in cells(table=table)
         } - {""}

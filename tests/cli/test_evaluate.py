@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from smo_gym.evaluation import configs
+
 ROOT = Path(__file__).resolve().parents[2]
 EVALUATE = ROOT / "agents" / "evaluate.py"
 
@@ -117,8 +119,8 @@ def test_one_seed_gives_one_result(tmp_path):
 
 
 def small_scenario(tmp_path, **changes):
-    text = (ROOT / "configs" / "initial-conditions.yaml").read_text()
-    data = yaml.safe_load(text) | {"extends": str(ROOT / "configs" / "article.yaml")} | changes
+    text = configs.path("initial-conditions").read_text()
+    data = yaml.safe_load(text) | {"extends": "article"} | changes
     path = tmp_path / "own.yaml"
     path.write_text(yaml.safe_dump(data))
     return path
@@ -175,7 +177,7 @@ def test_the_theorems_gains_are_an_arm_of_their_own(tmp_path):
     assert error["oracle"] == 0.0
     assert 0.0 < error["theorem"] < 0.5 * error["with"]
     assert "0 of 8" in (tmp_path / "out" / "tables.md").read_text()  # in the column of those that left the set
-    tight = yaml.safe_load((ROOT / "configs" / "article.yaml").read_text())["designed"]
+    tight = yaml.safe_load(configs.path("article").read_text())["designed"]
     tight["operating_set"]["speed"]["value"] = [0.1, 0.1]
     config = small_scenario(tmp_path, horizon={"value": 0.5, "source": "chosen"}, designed=tight)
     done = evaluate("--config", config, "--controller", "lqr", "--runs", "2", "--observer", "theorem", cwd=tmp_path)
@@ -187,7 +189,7 @@ def test_the_theorems_gains_are_an_arm_of_their_own(tmp_path):
 
 
 def test_falls_of_the_upright_plant_are_counted(tmp_path):
-    config = yaml.safe_load((ROOT / "configs" / "upright.yaml").read_text())
+    config = yaml.safe_load(configs.path("upright").read_text())
     config["horizon"]["value"] = 3.0
     config["uncertainty"]["value"] = [0.2]
     config["initial_states"]["value"] = {"near": [0.0, 0.05, 0.0, 0.0], "far": [0.0, 1.2, 0.0, 0.0]}

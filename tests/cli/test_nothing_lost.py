@@ -1,7 +1,7 @@
 """What was computed is kept, whatever console, disk, signal or another process do; sets of files are whole."""
 
 import errno
-import importlib.util
+import importlib
 import os
 import signal
 import subprocess
@@ -15,19 +15,16 @@ import yaml
 import smo_gym
 from smo_gym import files
 from smo_gym.cli import arguments
+from smo_gym.cli.commands import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
-COMMANDS = sorted(path.stem for path in (ROOT / "agents").glob("[!_]*.py"))
 SET = {"results.csv", "runs.csv", "tables.md", "tables.tex", "settings.yaml"}
 posix = pytest.mark.skipif(os.name != "posix", reason="of POSIX systems")
 
 
 def load(name):
     """A command as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "agents" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return importlib.import_module(f"smo_gym.cli.{name}")
 
 
 def names(folder):
@@ -38,7 +35,7 @@ def names(folder):
 def short(tmp_path):
     """Arguments of evaluate.py for runs of half a second."""
     changes = {"horizon": {"value": 0.5, "source": "chosen"}}
-    own = {"extends": str(ROOT / "configs" / "initial-conditions.yaml"), **changes}
+    own = {"extends": "initial-conditions", **changes}
     (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
     options = ("--runs", "2", "--controller", "lqr", "--out", str(tmp_path / "out"))
     return ["--config", str(tmp_path / "own.yaml"), *options]
@@ -131,7 +128,7 @@ def test_a_full_disk_is_one_line_and_the_tables_are_shown(short, tmp_path, monke
     assert evaluate.main([*short, "--seed", "1"]) == 1
     shown = capsys.readouterr()
     results = tmp_path / "out" / "results.csv"
-    assert shown.err == f"24 runs to do\nevaluate.py: error: {results}: No space left on device\n"
+    assert shown.err == f"24 runs to do\nsmo-gym evaluate: error: {results}: No space left on device\n"
     assert "Table 5, LQR" in shown.out
     assert "results are in" not in shown.out
     assert results.read_bytes() == before
@@ -246,11 +243,13 @@ def test_an_interruption_while_importing_is_one_line(command, tmp_path):
 
 @posix
 def test_a_parent_that_ignores_interruptions_is_obeyed():
-    code = "import signal, _starting; _starting.begin(); assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN"
+    code = (
+        "import signal; from smo_gym.cli import starting; starting.begin(); "
+        "assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN"
+    )
     subprocess.run(
         [sys.executable, "-c", code],
         check=True,
-        cwd=ROOT / "agents",
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
     )
 
@@ -281,7 +280,7 @@ def test_numbers_are_read_in_one_way():
         for text in texts:
             with pytest.raises(arguments.argparse.ArgumentTypeError, match=f"'{text}' must be a"):
                 kind(text)
-    parser = arguments.Parser("")
+    parser = arguments.Parser("", "")
     parser.add_argument("--start", type=arguments.real, nargs=2)
     assert parser.parse_args(["--start", "-1e-3", "2"]).start == [-1e-3, 2.0]
     command = load("evaluate").parse(["--controller", "lqr,smc", "--scenario", "regulation,tracking", "--runs", "1e1"])
@@ -291,7 +290,7 @@ def test_numbers_are_read_in_one_way():
 def test_messages_show_a_way_out(short, tmp_path, capsys):
     evaluate = load("evaluate")
     own = tmp_path / "own.yaml"
-    own.write_text(own.read_text().replace(str(ROOT / "configs" / "initial-conditions.yaml"), "article.yaml"))
+    own.write_text(own.read_text().replace("initial-conditions", "article.yaml"))
     assert evaluate.main(short) == 2
     message = capsys.readouterr().err
     assert f"{own}: extends='article.yaml' is no file: it must be named as it is found from {tmp_path}/" in message

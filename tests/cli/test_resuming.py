@@ -4,15 +4,13 @@ import json
 import math
 import os
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
+from smo_gym.evaluation import configs
 from smo_gym.learning import measurement, settings, training
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 @pytest.fixture(autouse=True)
@@ -24,8 +22,8 @@ def short(monkeypatch):
 
 def small_run(algorithm="ppo", **change):
     """Three checkpoints, 32 steps each."""
-    name = "ppo.yaml" if algorithm == "ppo" else "ppo_lstm.yaml"
-    run = settings.load(CONFIGS / name, "SMOPendulum-v0", algorithm, steps=96)
+    path = configs.path("ppo" if algorithm == "ppo" else "ppo_lstm")
+    run = settings.load(path, "SMOPendulum-v0", algorithm, steps=96)
     small = {"n_steps": 4, "batch_size": 32, "n_epochs": 1, **change}
     return training.replace(run, n_envs=8, hyperparameters=run.hyperparameters | small).checked()
 

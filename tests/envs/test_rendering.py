@@ -3,7 +3,6 @@
 import copy
 import os
 import pickle
-import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +16,7 @@ from PIL import Image, ImageColor
 
 import smo_gym
 from smo_gym import ObserverWrapper
+from smo_gym.cli import animate
 from smo_gym.envs import rendering
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -235,9 +235,8 @@ def test_rendering_without_a_mode_or_an_episode_is_refused():
 
 
 def test_an_animation_is_written(tmp_path, capsys):
-    animate = runpy.run_path(str(ROOT / "agents" / "animate.py"))["main"]
     for name in ("run.gif", "new/run.webp"):
-        assert animate(["--seconds", "0.4", "--out", str(tmp_path / name)]) == 0
+        assert animate.main(["--seconds", "0.4", "--out", str(tmp_path / name)]) == 0
         with Image.open(tmp_path / name) as image:
             assert (image.n_frames, image.size) == (11, rendering.SIZE)
     for bad, message in (
@@ -245,7 +244,7 @@ def test_an_animation_is_written(tmp_path, capsys):
         (["--controller", "lqg"], "unknown controller 'lqg': did you mean 'lqr'?"),
         (["--seconds", "-1"], "--seconds=-1.0 must be a finite number"),
     ):
-        assert animate(bad) == 2
+        assert animate.main(bad) == 2
         assert message in capsys.readouterr().err
 
 

@@ -301,7 +301,7 @@ def test_a_scenario_of_the_upright_plant_is_upright(tmp_path):
         assert not outcome.failed.any()
         assert outcome.metrics["peak_theta"].max() < 0.5
         assert outcome.metrics["mse_theta"].max() < 0.1**2
-    hanging_gain = scenario.load(path).model_copy(update={"environment": "SMOPendulum-v0"})
+    hanging_gain = scenario.load(path).changed(environment="SMOPendulum-v0")
     assert all(
         o.metrics["mse_h"].max() > 1.0
         for o in study.measure(study.groups([hanging_gain], ["lqr"], ["oracle"], 1), seed=0)

@@ -1,25 +1,20 @@
 """The article's figures: what they show is what was measured and published."""
 
-import runpy
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb, to_rgba
 
+from smo_gym.cli.evaluate import main as evaluate
 from smo_gym.evaluation import scenario, statistics, study
 from smo_gym.evaluation.report import figures, panels
 
-ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("regulation", "initial-conditions", "tracking")
 
 
 def load(name, **changes):
-    one = scenario.load(ROOT / "configs" / f"{name}.yaml")
-    changes = {"control_period": 0.01} | changes
-    settings = {key: getattr(one, key).model_copy(update={"value": value}) for key, value in changes.items()}
-    return one.model_copy(update=settings)
+    return scenario.named(name).changed(**({"control_period": 0.01} | changes))
 
 
 @pytest.fixture(scope="module")
@@ -215,12 +210,9 @@ def test_failed_runs_end_where_they_failed():
     assert last == pytest.approx(failed[0].metrics["duration"][0], abs=0.04)
 
 
-evaluate = runpy.run_path(str(ROOT / "agents" / "evaluate.py"))["main"]
-
-
 def test_the_command_draws_what_it_has_runs_for(tmp_path, capsys):
     config = tmp_path / "short.yaml"
-    config.write_text(f"extends: {ROOT}/configs/regulation.yaml\nhorizon: {{value: 1.0, source: chosen}}\n")
+    config.write_text("extends: regulation\nhorizon: {value: 1.0, source: chosen}\n")
     options = ["--config", str(config), "--controller", "lqr", "--runs", "2", "--out", str(tmp_path / "out")]
     assert evaluate([*options, "--figures"]) == 0
     assert "no runs for Figure 4, 7, 9, 10, 11, 12, 13, 14, 15, 16, 17: not drawn" in capsys.readouterr().out

@@ -18,13 +18,9 @@ KNOWN = np.log10([51.8, 57.4, 59.3, 0.284, 12.5, 12.5])
 pytest.importorskip("cma")
 
 
-def config(name):
-    return scenario.load(ROOT / "configs" / f"{name}.yaml")
-
-
 @pytest.fixture(scope="module")
 def problem():
-    return Lqr(config("initial-conditions"))
+    return Lqr(scenario.named("initial-conditions"))
 
 
 def rms(problem, hypothesis):
@@ -51,7 +47,7 @@ def test_the_profile_rises_away_from_the_optimum(problem):
 
 
 def test_the_settings_in_configs_fit_tables_4_and_5_under_smc():
-    problem = Regulation(config("initial-conditions"), config("regulation"))
+    problem = Regulation(scenario.named("initial-conditions"), scenario.named("regulation"))
     assert len(problem.labels()) == 24
     point = np.log10([1.4, 3.4, 3.3, 0.8, 33.3, 1.52, 1.18, 0.14, 0.2])
     other_k3, other_h = point.copy(), point.copy()
@@ -64,7 +60,7 @@ def test_the_settings_in_configs_fit_tables_4_and_5_under_smc():
 
 
 def test_the_settings_in_configs_fit_table_7():
-    tracking = Tracking(config("tracking"))
+    tracking = Tracking(scenario.named("tracking"))
     ours = np.log10([[2.5, 2.4, 2.7, 0.86], [1.4, 3.4, 3.3, 0.8]])
     here, there = cost(tracking, ours, Hypothesis())
     assert here < 0.15 < there
@@ -72,8 +68,7 @@ def test_the_settings_in_configs_fit_table_7():
 
 
 def test_only_printed_cells_can_be_fitted():
-    other = scenario.Setting[tuple[float, ...]](value=(0.05, 0.12), source="chosen")
-    tracking = config("tracking").model_copy(update={"uncertainty": other})
+    tracking = scenario.named("tracking").changed(uncertainty=(0.05, 0.12))
     with pytest.raises(ValueError, match="the article has no cell .*uncertainty_percent='12'"):
         Tracking(tracking)
 

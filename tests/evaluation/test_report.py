@@ -1,31 +1,24 @@
 """The report: one file that shows what was measured, without a browser and in one."""
 
-import importlib.util
 import json
 import math
 import sys
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from smo_gym import files
+from smo_gym.cli.evaluate import main
 from smo_gym.evaluation import scenario, statistics, study
 from smo_gym.evaluation.report import page as report
 from smo_gym.evaluation.report import page_traces, tables
 
-ROOT = Path(__file__).resolve().parents[2]
 EVIL = """</script><img src=x onerror="window.hacked = 1">&amp;"""
 
 
 def load(name, **changes):
-    one = scenario.load(ROOT / "configs" / f"{name}.yaml")
-    settings = {
-        key: getattr(one, key).model_copy(update={"value": value, "note": EVIL})
-        for key, value in ({"control_period": 0.01} | changes).items()
-    }
-    return one.model_copy(update=settings)
+    return scenario.named(name).changed(note=EVIL, **({"control_period": 0.01} | changes))
 
 
 def page_of(scenarios, controllers, runs=3):
@@ -39,7 +32,7 @@ def page():
     """Regulation with a track that one arm leaves, and tracking."""
     regulation = load("regulation", horizon=5.0, uncertainty=(0.05, 0.2), track_limit=1.65)
     tracking = load("tracking", uncertainty=(0.2,))
-    evil = regulation.model_copy(update={"title": EVIL, "controllers": {EVIL: regulation.controllers["lqr"]}})
+    evil = regulation.changed(title=EVIL, controllers={EVIL: regulation.controllers["lqr"]})
     return page_of([evil, tracking], [EVIL, "smc"])
 
 
@@ -110,7 +103,7 @@ def test_settings_stand_with_their_sources(page):
     rows = [row for row in Page(page[2]).rows if len(row) == 5]
     assert ["plant.gravity", "-9.8", "printed", "4, 7", "m/s²; g; Table 2"] in rows
     assert ["controllers.smc.Z0", "26", "printed", "7", "Table 6"] in rows
-    assert ["uncertainty", "[0.05, 0.2]", "printed", "4", EVIL] in rows
+    assert ["uncertainty", "[0.05, 0.2]", "chosen", "4", EVIL] in rows
     assert any(row[0] == "controllers.smc.k" and row[2] == "identified" for row in rows)
 
 
@@ -136,15 +129,12 @@ def test_few_enough_runs_are_kept(page, monkeypatch):
 @pytest.fixture
 def evaluate():
     """The command's function."""
-    spec = importlib.util.spec_from_file_location("evaluate", ROOT / "agents" / "evaluate.py")
-    command = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(command)
-    return lambda *arguments: command.main(list(map(str, arguments)))
+    return lambda *arguments: main(list(map(str, arguments)))
 
 
 def short(tmp_path):
     config = tmp_path / "short.yaml"
-    config.write_text(f"extends: {ROOT}/configs/regulation.yaml\nhorizon: {{value: 0.1, source: chosen}}\n")
+    config.write_text("extends: regulation\nhorizon: {value: 0.1, source: chosen}\n")
     return ["--config", config, "--controller", "lqr", "--runs", "2", "--out", tmp_path / "out"]
 
 

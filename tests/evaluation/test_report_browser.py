@@ -24,11 +24,11 @@ def browser():
 def report(tmp_path_factory):
     """The article's plant with runs that fail, one with a reference, the upright plant, and runs that fail at once."""
     regulation = load("regulation", horizon=5.0, uncertainty=(0.05, 0.2), track_limit=1.65)
-    regulation = regulation.model_copy(update={"title": EVIL, "controllers": {"lqr": regulation.controllers["lqr"]}})
+    regulation = regulation.changed(title=EVIL, controllers={"lqr": regulation.controllers["lqr"]})
     tracking = load("tracking", uncertainty=(0.2,))
     upright = load("upright", horizon=2.0, uncertainty=(0.1,), initial_states={"near": (0.0, 0.1, 0.0, 0.0)})
     nowhere = load("regulation", horizon=1.0, uncertainty=(0.1,), track_limit=1.0)
-    nowhere = nowhere.model_copy(update={"table": "none", "controllers": {"smc": nowhere.controllers["smc"]}})
+    nowhere = nowhere.changed(table="none", controllers={"smc": nowhere.controllers["smc"]})
     outcomes, results, text = page_of([regulation, tracking, upright, nowhere], ["lqr", "smc"])
     path = tmp_path_factory.mktemp("report") / "report.html"
     path.write_text(text)

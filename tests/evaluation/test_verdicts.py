@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -12,13 +11,11 @@ from smo_gym import CartPendulum, VectorObserverWrapper
 from smo_gym.evaluation import rollout, scenario, study, verdicts
 from smo_gym.evaluation.statistics import place, results
 
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
-
 
 @pytest.fixture(scope="module")
 def regulation():
     """Table 4's LQR runs, six plants a level."""
-    one = scenario.load(CONFIGS / "regulation.yaml")
+    one = scenario.named("regulation")
     return study.measure(study.groups([one], ["lqr"], ["without", "with"], 6), 0)
 
 
@@ -57,7 +54,7 @@ def runs(one, name, start, plants, xhat0=None):
 
 
 def test_falls_from_far_come_from_the_start_of_the_estimate():
-    one = scenario.load(CONFIGS / "upright.yaml")
+    one = scenario.named("upright")
     rng = np.random.default_rng(0)
     plants = np.array([CartPendulum(gravity=9.8).draw(0.2, rng).as_array() for _ in range(100)])
     start = [0.0, 0.4, 0.0, 0.0]
@@ -67,7 +64,7 @@ def test_falls_from_far_come_from_the_start_of_the_estimate():
 
 @pytest.mark.parametrize(("name", "least"), [("regulation", 0.01), ("tracking", 0.03)])
 def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
-    one = scenario.load(CONFIGS / f"{name}.yaml")
+    one = scenario.named(name)
     rng = np.random.default_rng(0)
     plants = np.array([CartPendulum().draw(0.2, rng).as_array() for _ in range(40)])
     (start,) = one.initial_states.value.values()
@@ -80,7 +77,7 @@ def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
 
 
 def test_table_7_scatters_more_than_ten_runs_explain():
-    one = scenario.load(CONFIGS / "tracking.yaml")
+    one = scenario.named("tracking")
     outcomes = study.measure(study.groups([one], ["smc"], ["without", "with"], 200), 0)
     cells = [r for r in results(outcomes) if r.cell.metric == "mse" and not r.cell.is_average and r.published > 0.0]
     assert len(cells) == 24

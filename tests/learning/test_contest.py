@@ -1,7 +1,6 @@
 """The RL table: who is compared, what the intervals are over, what a failed run counts."""
 
 import csv
-import importlib.util
 import sys
 from pathlib import Path
 
@@ -9,15 +8,13 @@ import numpy as np
 import pytest
 import yaml
 
+from smo_gym.cli import compare
 from smo_gym.evaluation import scenario, study
 from smo_gym.learning import bootstrap, contest, contest_table
 from smo_gym.learning.contest import FAILED, Contender, Scores
 from smo_gym.policies.frozen import Card, MlpPolicy
 
 ROOT = Path(__file__).resolve().parents[2]
-spec = importlib.util.spec_from_file_location("compare", ROOT / "agents" / "compare.py")
-compare = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(compare)
 K = np.array([7.197, -4.026, 10.96, -0.9999])  # of configs/article.yaml
 
 
@@ -59,7 +56,7 @@ def short(tmp_path):
     changes = {"horizon": 3.0, "uncertainty": [0.1, 0.2], "track_limit": 4.0}
     data = {name: {"value": value, "source": "chosen"} for name, value in changes.items()}
     path = tmp_path / "short.yaml"
-    path.write_text(yaml.safe_dump({"extends": str(ROOT / "configs" / "regulation.yaml"), **data}))
+    path.write_text(yaml.safe_dump({"extends": "regulation", **data}))
     return path
 
 
@@ -81,9 +78,7 @@ def test_the_table_is_made_of_runs_of_the_harness(tmp_path, short, capsys):
         runs = list(csv.DictReader(file))
     assert len(rows) == 3 * (3 + 6)
     # the policy is the LQR, so its runs are the LQR's, and the LQR's are those of agents/evaluate.py
-    place = scenario.load(short)
-    limit = scenario.Setting(value=30.0, source="chosen")
-    place = place.model_copy(update={"force_limit": limit})
+    place = scenario.load(short).changed(force_limit=30.0)
     (group,) = (g for g in study.groups([place], ["lqr"], ["with"], 3) if g.uncertainty == 0.2)
     (outcome,) = study.measure([group], 0)
     wanted = outcome.metrics["mse_h"] + outcome.metrics["mse_theta"]
@@ -189,7 +184,7 @@ def test_bad_folders_are_named_before_any_run(tmp_path, short, capsys):
     def error(*arguments):
         assert compare.main([*arguments, "--config", str(short), "--out", str(tmp_path / "out")]) == 2
         message = capsys.readouterr().err
-        assert message.startswith("compare.py: error: ")
+        assert message.startswith("smo-gym compare: error: ")
         assert not (tmp_path / "out").exists()
         return message
 

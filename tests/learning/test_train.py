@@ -1,6 +1,5 @@
 """Training runs: resumed, watched on other plants, exported; and bad input."""
 
-import importlib.util
 import os
 import pickle
 import sys
@@ -10,20 +9,18 @@ import numpy as np
 import pytest
 import yaml
 
+from smo_gym.cli import train
+from smo_gym.evaluation import configs
 from smo_gym.learning import measurement, settings, training
 from smo_gym.policies import MlpPolicy
 
 ROOT = Path(__file__).resolve().parents[2]
-CONFIGS = ROOT / "configs"
-spec = importlib.util.spec_from_file_location("train", ROOT / "agents" / "train.py")
-train = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(train)
 
 
 @pytest.fixture
 def command(tmp_path):
     """A command line that trains for some tenths of a second: two checkpoints on the way."""
-    small = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
+    small = yaml.safe_load(configs.path("ppo").read_text())
     small["SMOPendulum-v0"] |= {"n_envs": 8, "n_timesteps": 96, "n_steps": 4, "batch_size": 32, "n_epochs": 1}
     (tmp_path / "small.yaml").write_text(yaml.safe_dump(small))
 
@@ -60,7 +57,7 @@ def test_an_interrupted_run_ends_where_an_uninterrupted_one_does(command, tmp_pa
     assert whole.card.curve == resumed.card.curve
     assert [point["steps"] for point in whole.card.curve] == [32, 64, 96]
     assert whole.card.measured == resumed.card.measured
-    assert whole.card.command.startswith("python agents/train.py --config ")
+    assert whole.card.command.startswith("smo-gym train --config ")
     assert whole.card.configuration["options"]["uncertainty"] == 0.2
     before = (tmp_path / "run/policy.safetensors").read_bytes()
     assert command() == 0  # nothing is left to do
@@ -161,8 +158,8 @@ def test_an_interruption_before_anything_is_there(monkeypatch, capsys):
 
 
 def test_what_cannot_be_frozen_is_not_trained(tmp_path):
-    plain = settings.load(CONFIGS / "ppo.yaml", "SMOPendulum-v0", "ppo", steps=32)
-    recurrent = settings.load(CONFIGS / "ppo_lstm.yaml", "SMOPendulum-v0", "recurrent", steps=32)
+    plain = settings.load(configs.path("ppo"), "SMOPendulum-v0", "ppo", steps=32)
+    recurrent = settings.load(configs.path("ppo_lstm"), "SMOPendulum-v0", "recurrent", steps=32)
     squashed = {"use_sde": True, "policy_kwargs": {"squash_output": True}}
     for run, change, message in [
         (plain, squashed, "squash_output=True"),
@@ -189,7 +186,7 @@ def test_streams_of_seeds_share_nothing():
 
 
 def test_the_recurrent_algorithm_learns_and_is_exported(tmp_path, monkeypatch):
-    run = settings.load(CONFIGS / "ppo_lstm.yaml", "SMOPendulum-v0", "recurrent", steps=32)
+    run = settings.load(configs.path("ppo_lstm"), "SMOPendulum-v0", "recurrent", steps=32)
     small = training.replace(
         run, n_envs=4, hyperparameters=run.hyperparameters | {"n_steps": 8, "batch_size": 16, "n_epochs": 1}
     )
@@ -213,13 +210,13 @@ def test_the_recurrent_algorithm_learns_and_is_exported(tmp_path, monkeypatch):
 def test_bad_arguments(arguments, message, tmp_path, capsys):
     assert train.main([*arguments, "--out", str(tmp_path / "run")]) == 2
     error = capsys.readouterr().err
-    assert error.startswith("train.py: error: ")
+    assert error.startswith("smo-gym train: error: ")
     assert message in error
     assert not (tmp_path / "run").exists()
 
 
 def test_a_bad_setting_leaves_no_folder(tmp_path, capsys):
-    data = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
+    data = yaml.safe_load(configs.path("ppo").read_text())
     data["SMOPendulum-v0"]["batch_size"] = 1
     (tmp_path / "bad.yaml").write_text(yaml.safe_dump(data))
     assert train.main(["--config", str(tmp_path / "bad.yaml"), "--out", str(tmp_path / "run")]) == 2

@@ -1,15 +1,12 @@
 """Files of settings in the zoo's shape: what is taken, and what is refused before anything is made."""
 
 import re
-from pathlib import Path
 
 import pytest
 import yaml
 
-from smo_gym.evaluation import scenario
+from smo_gym.evaluation import configs, scenario
 from smo_gym.learning import settings
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 @pytest.mark.parametrize(
@@ -44,7 +41,7 @@ CONFIGS = Path(__file__).resolve().parents[2] / "configs"
     ],
 )
 def test_bad_settings(change, message, tmp_path):
-    data = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
+    data = yaml.safe_load(configs.path("ppo").read_text())
     data["SMOPendulum-v0"] |= {"n_envs": 4, "batch_size": 64} | change
     (tmp_path / "bad.yaml").write_text(yaml.safe_dump(data))
     with pytest.raises(ValueError, match=f"bad.yaml: .*{re.escape(message)}"):
@@ -52,7 +49,7 @@ def test_bad_settings(change, message, tmp_path):
 
 
 def test_what_the_zoo_takes_is_taken(tmp_path):
-    data = yaml.safe_load((CONFIGS / "ppo.yaml").read_text())
+    data = yaml.safe_load(configs.path("ppo").read_text())
     data["SMOPendulum-v0"] |= {"n_timesteps": 1e3, "target_kl": None, "clip_range": "lin_0.2"}
     data["SMOPendulum-v0"]["env_wrapper"] = [{settings.VIEW: {}}]
     (tmp_path / "zoo.yaml").write_text(yaml.safe_dump(data))

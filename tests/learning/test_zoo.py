@@ -3,21 +3,19 @@
 import importlib.util
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
+from smo_gym.evaluation import configs
 from smo_gym.policies import sb3_zip
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 @pytest.mark.skipif(importlib.util.find_spec("rl_zoo3") is None, reason="needs: pip install rl_zoo3")
-@pytest.mark.parametrize(("algorithm", "file"), [("ppo", "ppo.yaml"), ("ppo_lstm", "ppo_lstm.yaml")])
-def test_the_zoo_reads_the_hyperparameters(algorithm, file, tmp_path):
-    data = yaml.safe_load((CONFIGS / file).read_text())
+@pytest.mark.parametrize("algorithm", ["ppo", "ppo_lstm"])
+def test_the_zoo_reads_the_hyperparameters(algorithm, tmp_path):
+    data = yaml.safe_load(configs.path(algorithm).read_text())
     data["SMOPendulum-v0"] |= {"n_envs": 2, "n_steps": 16, "batch_size": 16}
     data["SMOPendulum-v0"]["env_kwargs"]["horizon"] = 0.1  # 5 steps
     (tmp_path / "small.yaml").write_text(yaml.safe_dump(data))

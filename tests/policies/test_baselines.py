@@ -1,7 +1,5 @@
 """The shipped policies do what their cards and the README say."""
 
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from smo_gym.learning.measurement import measure
 from smo_gym.policies import BASELINES, shipped
 from smo_gym.wrappers.view import KINDS
 
-TABLE_4 = scenario.load(Path(__file__).resolve().parents[2] / "configs" / "regulation.yaml")
+TABLE_4 = scenario.named("regulation")
 
 
 @pytest.mark.parametrize("environment", BASELINES)
@@ -59,9 +57,7 @@ def test_upright_none_of_a_hundred_plants_falls():
 
 def test_what_is_measured_beside_it_does_not_change_a_bit():
     """One batch holds all arms and plants of a study; the policy's sums do not depend on its size."""
-    short = scenario.Setting[float](value=1.0, source="chosen")
-    limit = scenario.Setting[float | None](value=30.0, source="chosen")
-    place = TABLE_4.model_copy(update={"horizon": short, "force_limit": limit}).with_agent("ppo")
+    place = TABLE_4.changed(horizon=1.0, force_limit=30.0).with_agent("ppo")
 
     def errors(controllers, arms):
         outcomes = study.measure(study.groups([place], controllers, arms, 3), 0)

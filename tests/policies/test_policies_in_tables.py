@@ -1,7 +1,6 @@
-"""Policies and agents of one's own in the tables of agents/evaluate.py."""
+"""Policies and agents of one's own in the tables of smo-gym evaluate."""
 
 import csv
-import importlib.util
 import json
 import re
 import sys
@@ -14,15 +13,13 @@ import yaml
 from stable_baselines3 import PPO, SAC
 
 from smo_gym import SlidingModeObserver
-from smo_gym.evaluation import scenario
+from smo_gym.cli import evaluate
+from smo_gym.evaluation import configs, scenario
 from smo_gym.policies.frozen import Card, MlpPolicy
 from smo_gym.wrappers.view import KINDS, agent_view
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "own-agent.md").read_text(encoding="utf-8")
-spec = importlib.util.spec_from_file_location("evaluate", ROOT / "agents" / "evaluate.py")
-evaluate = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(evaluate)
 
 # the gain of configs/article.yaml
 TWIN = """
@@ -64,7 +61,7 @@ def here(tmp_path, monkeypatch):
     monkeypatch.delitem(sys.modules, "twins", raising=False)
     (tmp_path / "twins.py").write_text(TWIN)
     (tmp_path / "leaves.py").write_text("raise SystemExit(3)\n")
-    short = {"extends": str(ROOT / "configs" / "regulation.yaml")}
+    short = {"extends": "regulation"}
     short |= {"horizon": {"value": 1.0, "source": "chosen"}, "uncertainty": {"value": [0.2], "source": "chosen"}}
     (tmp_path / "short.yaml").write_text(yaml.safe_dump(short))
     return tmp_path
@@ -159,7 +156,7 @@ def test_models_of_stable_baselines3_act_as_their_library_says(here):
 def named_in_a_scenario(here, **changes):
     """A scenario file with controllers whose agents have these names."""
     data = yaml.safe_load((here / "short.yaml").read_text())
-    smc = yaml.safe_load((ROOT / "configs" / "article.yaml").read_text())["controllers"]["smc"]
+    smc = yaml.safe_load(configs.path("article").read_text())["controllers"]["smc"]
     data["controllers"] = {
         name: {"law": "policy", "agent": agent, "observer": smc["observer"]} for name, agent in changes.items()
     }
@@ -186,7 +183,7 @@ def test_a_scenario_runs_no_code(here, agent, capsys):
         assert "--controller PATH.zip or module:Class" in error
         assert error.count("\n") == 1
     assert not (here / "ran").exists()
-    (here / "own.yaml").write_text(f"extends: {ROOT}/configs/regulation.yaml\nenvironment: twins:SMOPendulum-v0\n")
+    (here / "own.yaml").write_text("extends: regulation\nenvironment: twins:SMOPendulum-v0\n")
     assert evaluate.main(["--config", config]) == 2
     error = capsys.readouterr().err
     assert "environment: a file may not name a module to import: say 'SMOPendulum-v0', and --import twins" in error
@@ -209,7 +206,7 @@ def test_who_cannot_act_somewhere_is_left_out_there(here, capsys):
     linear("a.safetensors")
     assert evaluate.main(["--controller", "a.safetensors", "--scenario", "tracking"]) == 2
     assert "was trained for SMOPendulum-v0, not for SMOPendulumTracking-v0" in capsys.readouterr().err
-    scenarios = [scenario.load(Path("short.yaml")), scenario.load(ROOT / "configs" / "tracking.yaml")]
+    scenarios = [scenario.load(Path("short.yaml")), scenario.named("tracking")]
     more, names, left_out = evaluate.chosen(scenarios, ["a.safetensors", "smc"])
     assert names == ["a.safetensors", "smc"]
     assert ["a.safetensors" in one.controllers for one in more] == [True, False]
@@ -219,7 +216,7 @@ def test_who_cannot_act_somewhere_is_left_out_there(here, capsys):
 
 
 def test_training_and_tables_have_the_same_observer():
-    observer = scenario.load(ROOT / "configs" / "regulation.yaml").controllers["lqr"].observer
+    observer = scenario.named("regulation").controllers["lqr"].observer
     for kind, compensation in (("smo", True), ("smo-uncompensated", False)):
         settings = {name: value for name, value in KINDS[kind].observer.items() if name != "observer"}
         assert SlidingModeObserver(**settings).as_dict() == observer.build(compensation).as_dict()
@@ -264,7 +261,7 @@ def test_bad_input_is_named_before_any_run(here, controller, message, capsys):
         path.write_bytes(path.read_bytes()[:-9] if path.exists() else b"PK\x03\x04")
     assert evaluate.main(["--config", "short.yaml", "--controller", controller, "lqr", "--out", "out"]) == 2
     error = capsys.readouterr().err
-    assert "evaluate.py: error: " in error
+    assert "smo-gym evaluate: error: " in error
     assert message in error
     assert not list(here.glob("out/*"))
 
@@ -291,5 +288,5 @@ def test_the_pages_agent_runs_as_it_stands(here, monkeypatch, capsys):
     assert 0.0 < float(mse) < 1.0
     assert failed == "0"
     (settings,) = re.findall(r"```yaml(?: title=.+?)?\n(.*?)```", PAGE, re.DOTALL)
-    (here / "mine.yaml").write_text(settings.replace("configs/", f"{ROOT}/configs/"))
+    (here / "mine.yaml").write_text(settings)
     assert isinstance(scenario.load(Path("mine.yaml")).agent("mine"), MlpPolicy)

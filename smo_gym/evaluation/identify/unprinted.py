@@ -22,7 +22,7 @@ from ...typing import Array
 from ...wrappers import VectorObserverWrapper
 from ..rollout import rollout
 from ..scenario import Scenario
-from ..settings import LqrSettings, Setting, SmcSettings
+from ..settings import LqrSettings, SmcSettings
 from ..study import deviations as draws
 from .search import Hypothesis
 
@@ -54,12 +54,9 @@ def _mse(
         plants: [M_c, m, l, g], (plants, 4).
     """
     if hypothesis.horizon is not None:
-        horizon = Setting[float](value=hypothesis.horizon, source="chosen")
-        scenario = scenario.model_copy(update={"horizon": horizon})
+        scenario = scenario.changed(horizon=hypothesis.horizon)
     if hypothesis.elements is not None and scenario.reference is not None:
-        elements = Setting[int](value=hypothesis.elements, source="chosen")
-        reference = scenario.reference.model_copy(update={"elements": elements})
-        scenario = scenario.model_copy(update={"reference": reference})
+        scenario = scenario.changed(reference=scenario.reference.changed(elements=hypothesis.elements))
     slots = [
         (
             replace(

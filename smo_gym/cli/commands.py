@@ -1,0 +1,47 @@
+"""``smo-gym COMMAND``: each command is the module of its name, which is imported when it is wanted."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from .arguments import Parser, one_of
+from .entry import command
+
+COMMANDS = {
+    "evaluate": "measure controllers on the article's scenarios, beside the published numbers",
+    "compare": "the RL table: learned policies, LQR and SMC on the same plants",
+    "train": "train a policy with PPO on what an agent can know",
+    "theorem": "the theorem's conditions, designed gains and promised times",
+    "upright": "how often the upright plant falls",
+    "consistency": "the article's averages and reductions against its own cells",
+    "identify": "recover what the article does not print",
+    "reference": "the minimum-energy reference of the tracking scenario",
+    "animate": "a run as a GIF or WebP",
+}
+"""In a line each."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command that comes first; its exit code, 2 where there is no such command."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if given and given[0] in COMMANDS:
+        run = import_module(f"{__package__}.{given[0]}").main
+        return int(run(given[1:]))
+    return without_command(given[:1])
+
+
+@command("")
+def without_command(arguments: Sequence[str] | None = None) -> int:
+    """Say what there is, or that there is no such command."""
+    width = max(map(len, COMMANDS))
+    listed = "\n".join(f"  {name:{width}}  {what}" for name, what in COMMANDS.items())
+    parser = Parser("", f"Sliding mode estimation and control of an uncertain cart pendulum.\n\ncommands:\n{listed}")
+    parser.usage = "%(prog)s COMMAND ..."
+    parser.epilog = "%(prog)s COMMAND --help tells a command's arguments."
+    known = one_of("command", [*COMMANDS])
+    parser.add_argument("command", metavar="COMMAND", type=known, help=argparse.SUPPRESS)
+    parser.parse_args(arguments)
+    return 0

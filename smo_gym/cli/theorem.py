@@ -1,0 +1,260 @@
+"""Theorem 1 of the article as numbers: gain conditions, gains that satisfy them, promised times against measured ones.
+
+    smo-gym theorem
+
+Prints (28), (30) and (31) for the printed and for designed gains over a declared operating set and along the runs of
+Table 5, then runs both observers on the same random plants, then shows where (51) and (52) fail. Put `gains` into a
+settings file (--config) to see those of your own beside them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from scipy import stats
+from tabulate import tabulate
+from tqdm import tqdm
+
+from .. import (
+    CartPendulum,
+    Gains,
+    SlidingModeController,
+    SlidingModeObserver,
+    VectorObserverWrapper,
+    files,
+    theorem,
+)
+from ..evaluation import configs, rollout, scenario
+from ..evaluation.rollout import Traces
+from ..evaluation.scenario import Scenario, TheoremSettings
+from ..evaluation.theorem_on_runs import SHARES, Convergence, converge
+from .arguments import Parser
+from .entry import command
+
+DT = 0.001
+RESULT = "theorem.txt"
+
+
+@command("theorem")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the three parts; 0 when all went well, 2 for a bad argument or setting."""
+    parser = Parser("theorem", __doc__)
+    config = configs.path("theorem")
+    parser.add_argument("--config", type=Path, default=config, metavar="FILE", help="operating set")
+    parser.runs(1000, "random plants, starts")
+    parser.seed("the random plants and starts")
+    parser.out(None, "folder for theorem.txt")
+    args = parser.parse_args(arguments)
+    settings = scenario.load_theorem(args.config)
+    over = settings.over(CartPendulum())
+    observer = settings.build(DT, over.model)
+    with contextlib.nullcontext() if args.out is None else files.claimed(args.out, [RESULT]) as out:
+        said_all = io.StringIO()
+        with contextlib.redirect_stdout(said_all):
+            parts(settings, over, observer, args.runs, args.seed)
+        try:
+            if out is not None:
+                files.write(out / RESULT, said_all.getvalue())
+        finally:  # what cannot be written can be read at least
+            print(said_all.getvalue(), end="")
+    return 0
+
+
+def parts(
+    settings: TheoremSettings, over: theorem.OperatingSet, observer: SlidingModeObserver, count: int, seed: int
+) -> None:
+    """Print the three parts."""
+    article = scenario.named("initial-conditions")
+    gains = {"printed, LQR": Gains.of("lqr"), "printed, SMC": Gains.of("smc"), "designed": Gains.of(observer.gains)}
+    if settings.gains is not None:
+        gains["your own"] = Gains.of(settings.gains.value)
+    gain_conditions(gains, over)
+    epsilon_1, epsilon_2 = theorem.initial_errors(settings.starts.value, observer.xhat0)
+    print(
+        f"\nOver the box of starts (36) and (37) hold for epsilon_1 > ({pair(epsilon_1)}) and epsilon_2 > "
+        f"({pair(epsilon_2)})."
+    )
+    print(
+        f"The designed observer wants a step of {1e3 * (observer.step or DT):.3g} ms with slopes {observer.slopes}.\n"
+    )
+    rng = np.random.default_rng(seed)
+    low, high = np.array(settings.starts.value)
+    starts = rng.uniform(low, high, (count, 4))
+    plants = np.array([CartPendulum().draw(over.uncertainty, rng).as_array() for _ in range(count)])
+    lqr = article.controllers["lqr"]
+    printed = lqr.observer.build(compensation=True)
+    observers = {
+        "designed": observer,
+        "designed gains, printed runs' slopes": theorem.stable(
+            Gains.of(observer.gains), printed.slopes, DT, settings.force.value
+        ),
+        "printed gains, designed slopes": theorem.stable(
+            Gains.of(printed.gains), observer.slopes, DT, settings.force.value
+        ),
+        "printed": printed,
+    }
+    with tqdm(total=round(settings.horizon.value / DT), desc="samples", leave=False, disable=None) as bar:
+        found = converge(
+            observers,
+            article.agent("lqr"),
+            over,
+            starts,
+            plants,
+            force=settings.force.value,
+            horizon=settings.horizon.value,
+            settle=settings.settle.value,
+            progress=bar.update,
+        )
+    runs(found, settings)
+    traces = {name: along(article, name) for name in article.controllers}
+    trajectories(article, traces)
+    switching(article, traces["smc"])
+
+
+def gain_conditions(gains: dict[str, Gains], over: theorem.OperatingSet) -> None:
+    """(28), (30) and (31) for some gains."""
+    bounds = theorem.suprema(over)
+    rows = [
+        (name, row.name, pair(row.gain), pair(row.supremum), " ".join(map(said, row.by_row)), said(row.literal))
+        for name, value in gains.items()
+        for row in theorem.conditions(value, bounds)
+    ]
+    print(
+        f"Over |theta| <= {over.theta} rad, |h'| <= {over.speed[0]} m/s, |theta'| <= {over.speed[1]} rad/s, "
+        f"plants within {100 * over.uncertainty:g} %:\n"
+    )
+    header = ("gains", "condition", "gain (h, theta)", "supremum", "row by row", "as printed")
+    print(tabulate(rows, header, disable_numparse=True))
+
+
+def runs(found: Convergence, settings: TheoremSettings) -> None:
+    """What the runs showed."""
+    stayed, total = found.tested, len(found.stayed)
+    n, inside = int(stayed.sum()), int(found.kept[stayed].sum())
+    bounds = ", ".join(f"{value:.2f}" for value in found.largest)
+    print(f"Largest |theta|, |h'|, |theta'|, estimates of these, and |u|: {bounds}.")
+    print(
+        f"{n} of {total} runs stayed in the operating set, with |u| <= {settings.force.value:g} N, and outlasted t0; "
+        f"{total - n} did not and are not counted."
+    )
+    if not n:
+        return
+    interval = stats.binomtest(inside, n).proportion_ci(method="wilson")
+    print(
+        f"{inside} of {n} were inside the layer of both positions by the time of (43) and stayed there, which is seen "
+        "and, with tanh, not promised "
+        f"(95 % Wilson interval {interval.low:.4f} to {interval.high:.4f}).\n"
+    )
+    rows = [
+        (
+            state,
+            f"{np.median(found.promised[i, stayed]):.3f}",
+            f"{np.median(found.reached[i, stayed]):.3f}",
+            f"{np.min((found.promised - found.reached)[i, stayed]):.4f}",
+            f"{np.median(found.promised_velocity[i, stayed]):.3f}",
+            f"{np.nanmax(found.velocity_error[i, stayed]):.3f}",
+        )
+        for i, state in enumerate(("h", "theta"))
+    ]
+    header = (
+        "",
+        "t0 of (43), s",
+        "reached, s",
+        "least to spare, s",
+        "t1 of (48), s",
+        "largest velocity error after t1",
+    )
+    print(tabulate(rows, header, disable_numparse=True), "\n")
+    with_tanh(found, settings.settle.value)
+    rms = [
+        (name, *(f"{v:.2g}" for v in values), pair(found.velocity_rms["printed"] / values))
+        for name, values in found.velocity_rms.items()
+    ]
+    title = (
+        f"RMS velocity error after {settings.settle.value:g} s, same runs",
+        "h', m/s",
+        "theta', rad/s",
+        "smaller by",
+    )
+    print(tabulate(rms, title, disable_numparse=True), "\n")
+
+
+def with_tanh(found: Convergence, settle: float) -> None:
+    """The bounds that hold with tanh, which (43) and (48) are not."""
+    n = int(found.stayed.sum())
+    for i, share in enumerate(SHARES):
+        kept = found.bounded[i][:, found.stayed].all(axis=0)
+        print(
+            f"{int(kept.sum())} of {n} kept |e| <= atanh((V + kappa) / m1) / k_p from |e(0)| / kappa on, "
+            f"kappa = {share:g} (m1 - V)."
+        )
+    print(
+        f"In the end |X2 - X2hat| is at most ({pair(found.velocity_bound)}) m/s, rad/s; largest after {settle:g} s: "
+        f"({pair(found.velocity_settled[:, found.stayed].max(axis=1))}).\n"
+    )
+
+
+def along(article: Scenario, controller: str) -> Traces:
+    """Runs of Table 5's cases on the nominal plant, with compensation."""
+    observer, cases = article.controllers[controller].observer, article.initial_states.value
+    env = gymnasium.make_vec("SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.options)
+    observed = VectorObserverWrapper(env, observer.build(compensation=True))
+    plants = np.repeat(CartPendulum().as_array()[None], len(cases), axis=0)
+    options = {"state": np.array(list(cases.values())), "params": plants}
+    result = rollout(observed, article.agent(controller), options=options, trace_every=1)
+    assert result.traces is not None
+    return result.traces
+
+
+def trajectories(article: Scenario, traces: dict[str, Traces]) -> None:
+    """(28), (30) and (31) along runs of Table 5's cases."""
+    rows = []
+    for name, runs in traces.items():
+        gains = Gains.of(article.controllers[name].observer.gains.value)
+        for i, case in enumerate(article.initial_states.value):
+            bounds = theorem.suprema_along(runs.x[:, :, i].T, runs.xhat[:, :, i].T, CartPendulum())
+            checked = theorem.conditions(gains, bounds)
+            verdicts = [f"{pair(row.supremum)} ({' '.join(map(said, row.by_row))})" for row in checked]
+            rows.append((f"{name.upper()}, case {case}", *verdicts))
+    names = ("(28): sup |X2| (row by row)", "(30): sup of the drift's error", "(31): sup of the gain's error")
+    print(tabulate(rows, ("Table 5, nominal plant", *names), disable_numparse=True), "\n")
+
+
+def switching(article: Scenario, traces: Traces) -> None:
+    """(51) and (52) along SMC runs of Table 5's cases on the nominal plant."""
+    law = article.agent("smc")
+    assert isinstance(law, SlidingModeController)
+    rows = []
+    for i, case in enumerate(article.initial_states.value):
+        push, needed = theorem.controllability(law, traces.xhat[:, :, i].T)
+        share = f"{100 * np.mean(push > needed):.2f} %"
+        least = f"{push[1:].min() / law.Z0:.1g}"  # at the very start xhat = 0
+        rows.append(
+            (f"case {case}", least, f"{np.median(push):.2g}", f"{push.max():.3g}", f"{needed.min():.3g}", share)
+        )
+    header = (
+        "SMC, Table 5",
+        "(51): least |ds/dx g|",
+        "(52): |ds/dx g| Z0, median",
+        "largest",
+        "|ds/dx f| + lambda, least",
+        "holds for",
+    )
+    print(tabulate(rows, header, disable_numparse=True))
+    print("\ns is a sum of squares: its gradient vanishes on s = 0, where (52) would ask 0 > lambda + delta.")
+
+
+def pair(values: np.ndarray) -> str:
+    """Two numbers to read."""
+    return ", ".join(f"{value:.3g}" for value in values)
+
+
+def said(holds: object) -> str:
+    """A truth value in a word."""
+    return "holds" if holds else "fails"

@@ -1,0 +1,76 @@
+"""Train a policy with PPO on what an agent can know, on plants drawn anew for every episode.
+
+    smo-gym train --env SMOPendulum-v0 --observation smo
+
+Writes a checkpoint to --out every twentieth of the way, from which the same command resumes; at the end the policy,
+policy.safetensors, and a card of what it is, where it comes from and what it was measured to do, policy.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from tabulate import tabulate
+from tqdm import tqdm
+
+from .. import files
+from ..evaluation import configs
+from ..wrappers.view import KINDS
+from .arguments import Parser, fraction, versions, whole
+from .entry import Stop, command, typed
+
+DEFAULTS = {"ppo": "ppo", "recurrent": "ppo_lstm"}
+"""Hyperparameters of each algorithm, by the name of their file."""
+PACKAGES = ("smo_gym", "gymnasium", "numpy", "stable-baselines3", "sb3-contrib", "torch")
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """The command line."""
+    parser = Parser("train", __doc__)
+    add = parser.add_argument
+    add("--env", default="SMOPendulum-v0", help="an environment of --config (default SMOPendulum-v0)")
+    add("--observation", help=f"{', '.join(KINDS)} (default: that of --config)")
+    add("--algo", choices=DEFAULTS, default="ppo", help="ppo (default), or recurrent: an LSTM on positions alone")
+    parser.seed("weights, exploration and plants")
+    add("--steps", type=whole(1), metavar="N", help="control periods to learn from (default: those of --config)")
+    add("--uncertainty", type=fraction, metavar="X", help="level of the plants, a fraction (default: that of --config)")
+    add("--config", type=Path, metavar="FILE", help="hyperparameters (default: configs/ppo.yaml or ppo_lstm.yaml)")
+    add("--out", type=Path, metavar="DIR", help="default: runs/ENV-OBSERVATION-ALGO-SEED")
+    add("--tensorboard", action="store_true", help="write what TensorBoard shows, to DIR/tensorboard")
+    args = parser.parse_args(arguments)
+    args.config = args.config or configs.path(DEFAULTS[args.algo])
+    return args
+
+
+@command("train")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Train; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
+    args, out = parse(arguments), None
+    try:
+        from ..learning import settings, training
+
+        run = settings.load(args.config, args.env, args.algo, args.observation, args.seed, args.steps, args.uncertainty)
+        name = f"{run.environment}-{run.observation}-{run.algorithm}-{run.seed}"
+        with files.claimed(args.out or Path("runs") / name, ["policy.safetensors", "policy.json"]) as out:
+            with tqdm(total=run.steps, unit="step", unit_scale=True, desc="learning", disable=None) as bar:
+
+                def show(steps: int, found: dict[str, float]) -> None:
+                    bar.update(min(steps, run.steps) - bar.n)
+                    bar.set_postfix({key: f"{value:.4g}" for key, value in found.items()})
+
+                policy = training.train(run, out, show, args.tensorboard)
+            told = {"command": typed("train", arguments), "versions": versions(PACKAGES)}
+            card = policy.card.model_copy(update=told)
+            replace(policy, card=card).save(out / "policy.safetensors")
+    except KeyboardInterrupt:
+        where = f"; the same command resumes from the last checkpoint in {out}" if out else " before it began"
+        raise Stop(f"interrupted{where}") from None
+    columns = ("steps", "runs", "failed", "mse_h", "mse_theta")
+    rows = [[point.get(column, float("nan")) for column in columns] for point in policy.card.curve]
+    print(f"While learning, over the environment's whole horizon on {rows[-1][1]} plants that learning does not see:\n")
+    print(tabulate(rows, columns, floatfmt=".4g"))
+    print(f"\nThe best of them, on others: {policy.card.measured}\nThe policy is {out / 'policy.safetensors'}")
+    return 0

@@ -1,0 +1,83 @@
+"""How often the truly inverted plant falls: by observer, start and uncertainty.
+
+smo-gym upright --runs 1000
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+
+from scipy import stats
+from tabulate import tabulate
+
+from .. import files
+from ..evaluation import configs, scenario, study
+from ..evaluation.formats import as_csv, markdown
+from .arguments import Parser
+from .entry import command
+from .progress import simulated
+
+RESULTS = ("falls.csv", "falls.md")
+ARMS = {
+    "without": "printed gains, without compensation",
+    "with": "with compensation",
+    "theorem": "designed gains",
+    "oracle": "true state",
+}
+
+
+@command("upright")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Print the table of falls; 0 when all went well, 2 for a bad argument or setting."""
+    parser = Parser("upright", __doc__)
+    config = configs.path("upright")
+    parser.add_argument("--config", type=Path, default=config, metavar="FILE", help="a scenario of your own")
+    parser.runs(1000, "random plants a cell")
+    parser.seed("the random plants")
+    parser.out(None, "folder for falls.csv and falls.md")
+    args = parser.parse_args(arguments)
+    place = scenario.load(args.config)
+    groups = [g for g in study.groups([place], list(place.controllers), list(ARMS), args.runs) if g.uncertainty > 0.0]
+    with contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS) as out:
+        with simulated(groups) as bar:
+            outcomes = study.measure(groups, args.seed, bar.update)
+        told = f"Falls in percent of {args.runs} random plants, with 95 % Wilson intervals:\n\n"
+        try:
+            if out is not None:
+                falls = told + table(outcomes, "github") + f"\n\nSeed {args.seed}, {markdown(str(args.config))}\n"
+                files.write_set(out, dict(zip(RESULTS, (data(outcomes), falls), strict=True)))
+        finally:  # what cannot be written can be read at least
+            print(told + table(outcomes, "simple"))
+    return 0
+
+
+def table(outcomes: Sequence[study.Outcome], form: str) -> str:
+    """Percentages by start, level and arm, in a format of tabulate."""
+    cells: dict[tuple[str, str], dict[str, str]] = {}
+    for group, falls, runs, low, high in counts(outcomes):
+        text = f"{100 * falls / runs:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
+        cells.setdefault((group.case, f"{100 * group.uncertainty:g} %"), {})[group.arm] = text
+    rows = [(*place, *(by_arm[arm] for arm in ARMS)) for place, by_arm in cells.items()]
+    rows.sort(key=lambda row: row[0])  # starts, each with its levels in order
+    return tabulate(rows, ("start, rad", "uncertainty", *ARMS.values()), tablefmt=form, disable_numparse=True)
+
+
+def data(outcomes: Sequence[study.Outcome]) -> str:
+    """The same as CSV, fractions in place of percentages."""
+    lines = [
+        (group.case, group.uncertainty, group.arm, falls, runs, falls / runs, low, high)
+        for group, falls, runs, low, high in counts(outcomes)
+    ]
+    return as_csv(("start", "uncertainty", "arm", "falls", "runs", "fraction", "ci_low", "ci_high"), lines)
+
+
+def counts(outcomes: Sequence[study.Outcome]) -> list[tuple[study.Group, int, int, float, float]]:
+    """Falls and runs of every group, and the Wilson interval of their ratio."""
+    found = []
+    for outcome in outcomes:
+        falls, runs = int(outcome.failed.sum()), len(outcome.failed)
+        interval = stats.binomtest(falls, runs).proportion_ci(method="wilson")
+        found.append((outcome.group, falls, runs, float(interval.low), float(interval.high)))
+    return found

@@ -1,0 +1,28 @@
+"""The settings that come with the package, a YAML file each: scenarios, an operating set, hyperparameters."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ..validation import choice
+
+
+def folder() -> Path:
+    """Where they are: inside an installed package, beside the package in a checkout."""
+    package = Path(__file__).resolve().parents[1]
+    inside = package / "configs"
+    return inside if inside.is_dir() else package.parent / "configs"
+
+
+def names() -> list[str]:
+    """What there is: regulation, tracking and others."""
+    return sorted(path.stem for path in folder().glob("*.yaml"))
+
+
+def path(name: str) -> Path:
+    """The file of one by its name.
+
+    Raises:
+        ValueError: there is none of this name.
+    """
+    return folder() / f"{choice('settings', name, names())}.yaml"
