@@ -25,20 +25,21 @@ import yaml
 from tqdm import tqdm
 
 from smo_gym import files
+from smo_gym.article import WITH, WITHOUT
 from smo_gym.cli.arguments import Parser, fraction, one_of, positive, several, versions, whole
 from smo_gym.cli.entry import Stop, command, said
 from smo_gym.cli.progress import simulated
 from smo_gym.evaluation import scenario, study
+from smo_gym.evaluation.arms import ARMS, EVERY, PRINTED, SMO
 from smo_gym.evaluation.report import figures, page, tables
 from smo_gym.evaluation.statistics import Result, results
 from smo_gym.policies import named
-from smo_gym.validation import unknown
+from smo_gym.validation import choice, unknown
 
 CONFIGS = Path(__file__).resolve().parent.parent / "configs"
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
-OBSERVERS = ("smo", "theorem", "oracle")
 RESULTS = ("results.csv", "runs.csv", "tables.md", "tables.tex", "reference.json", "settings.yaml")
-COMPENSATION = {"on": ("with",), "off": ("without",), "both": ("without", "with")}
+COMPENSATION = {"on": (WITH,), "off": (WITHOUT,), "both": PRINTED}
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -65,7 +66,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         nargs="+",
         default=[],
         metavar="MODULE",
-        help="that registers environments of your own",
+        help="that registers environments, or arms with observers, of your own",
     )
     add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
     add(
@@ -78,9 +79,10 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
     add(
         "--observer",
-        type=one_of("observer", (*OBSERVERS, "all")),
-        default="smo",
-        help="smo (default), theorem (gains designed for it), oracle (the true state) or all",
+        default=SMO,
+        metavar="NAME",
+        help="smo (default), theorem (gains designed for it), oracle (the true state), an arm that an imported module "
+        "registers, or all",
     )
     add(
         "--compensation",
@@ -144,14 +146,14 @@ def chosen_arms(observer: str, compensation: str | None) -> list[str]:
     """The arms of the comparison.
 
     Raises:
-        ValueError: compensation is asked of an observer that has no such switch.
+        ValueError: no arm has such an observer, or compensation is asked of one that has no such switch.
     """
-    if observer in ("theorem", "oracle"):
+    others = [name for name in ARMS if name not in PRINTED]
+    if choice("observer", observer, (SMO, *others, EVERY)) in others:
         if compensation is not None:
             raise ValueError(f"--compensation {compensation} is for the observer smo, not --observer {observer}")
         return [observer]
-    others = OBSERVERS[1:] if observer == "all" else ()
-    return [*COMPENSATION[compensation or "both"], *others]
+    return [*COMPENSATION[compensation or "both"], *(others if observer == EVERY else ())]
 
 
 @command("evaluate.py")
@@ -162,8 +164,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sys.path.append(os.getcwd())  # where an agent of one's own usually is
     for module in args.modules:
         named.imported(module)
-    scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
     arms = chosen_arms(args.observer, args.compensation)
+    scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
     groups = study.groups(scenarios, controllers, arms, args.runs)
     drawn, left_out = figures.planned(groups) if args.figures else ([], [])
     drawings = [drawing(plan, form) for plan in drawn for form in figures.FORMATS]

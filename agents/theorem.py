@@ -209,7 +209,9 @@ def with_tanh(found: Convergence, settle: float) -> None:
 def along(article: Scenario, controller: str) -> Traces:
     """Runs of Table 5's cases on the nominal plant, with compensation."""
     observer, cases = article.controllers[controller].observer, article.initial_states.value
-    env = gymnasium.make_vec("SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.options)
+    env = gymnasium.make_vec(
+        "SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.environment_options
+    )
     observed = VectorObserverWrapper(env, observer.build(compensation=True))
     plants = np.repeat(CartPendulum().as_array()[None], len(cases), axis=0)
     options = {"state": np.array(list(cases.values())), "params": plants}

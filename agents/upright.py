@@ -19,19 +19,19 @@ from scipy import stats
 from tabulate import tabulate
 
 from smo_gym import files
+from smo_gym.article import WITHOUT
 from smo_gym.cli.arguments import Parser, whole
 from smo_gym.cli.entry import command
 from smo_gym.cli.progress import simulated
 from smo_gym.evaluation import scenario, study
+from smo_gym.evaluation.arms import ARMS, THEOREM
 from smo_gym.evaluation.formats import as_csv, markdown
 
 CONFIG = Path(__file__).resolve().parent.parent / "configs" / "upright.yaml"
 RESULTS = ("falls.csv", "falls.md")
-ARMS = {
-    "without": "printed gains, without compensation",
-    "with": "with compensation",
-    "theorem": "designed gains",
-    "oracle": "true state",
+TITLES = {arm.name: arm.title for arm in ARMS.values()} | {
+    WITHOUT: "printed gains, without compensation",
+    THEOREM: "designed gains",
 }
 
 
@@ -45,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for falls.csv and falls.md (default: none)")
     args = parser.parse_args(arguments)
     one = scenario.load(args.config)
-    groups = [g for g in study.groups([one], list(one.controllers), list(ARMS), args.runs) if g.uncertainty > 0.0]
+    groups = [g for g in study.groups([one], list(one.controllers), list(TITLES), args.runs) if g.uncertainty > 0.0]
     with contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS) as out:
         with simulated(groups) as bar:
             outcomes = study.measure(groups, args.seed, bar.update)
@@ -65,9 +65,9 @@ def table(outcomes: Sequence[study.Outcome], form: str) -> str:
     for group, falls, runs, low, high in counts(outcomes):
         text = f"{100 * falls / runs:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
         cells.setdefault((group.case, f"{100 * group.uncertainty:g} %"), {})[group.arm] = text
-    rows = [(*place, *(by_arm[arm] for arm in ARMS)) for place, by_arm in cells.items()]
+    rows = [(*place, *(by_arm[arm] for arm in TITLES)) for place, by_arm in cells.items()]
     rows.sort(key=lambda row: row[0])  # starts, each with its levels in order
-    return tabulate(rows, ("start, rad", "uncertainty", *ARMS.values()), tablefmt=form, disable_numparse=True)
+    return tabulate(rows, ("start, rad", "uncertainty", *TITLES.values()), tablefmt=form, disable_numparse=True)
 
 
 def data(outcomes: Sequence[study.Outcome]) -> str:
