@@ -123,6 +123,17 @@ def test_sliding_mode_observers_of_one_step_share_a_batch(own, small, monkeypatc
     assert batches == [{"without", "with", "steep"}, {"theorem"}, {"oracle"}, {"held"}]
 
 
+def test_scenarios_that_differ_in_their_designed_gains_each_have_their_own(small):
+    more = small.designed.margin.model_copy(update={"value": 0.12})  # of the same step
+    other = small.model_copy(update={"designed": small.designed.model_copy(update={"margin": more})})
+    wanted = [study.groups([one], ["lqr"], ["theorem"], 1) for one in (small, other)]
+    together = study.measure([*wanted[0], *wanted[1]], seed=0)
+    alone = [outcome for groups in wanted for outcome in study.measure(groups, seed=0)]
+    for a, b in zip(together, alone, strict=True):
+        assert np.array_equal(a.metrics["estimation_rms_h_dot"], b.metrics["estimation_rms_h_dot"])
+    assert not np.array_equal(alone[0].metrics["mse_h"], alone[len(wanted[0])].metrics["mse_h"])
+
+
 def test_statistics_and_tables_follow_the_registry(own, small):
     outcomes = study.measure(study.groups([small], ["lqr"], ["held", "with", "steep"], 2), seed=0)
     found = dict.fromkeys(result.cell.compensation for result in statistics.results(outcomes))
