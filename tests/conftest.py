@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import smo_gym  # noqa: F401  registers the environments
+from smo_gym.evaluation.arms import ARMS
 
 IDS = ("SMOPendulum-v0", "SMOPendulumUpright-v0", "SMOPendulumTracking-v0")
 
@@ -12,6 +13,15 @@ IDS = ("SMOPendulum-v0", "SMOPendulumUpright-v0", "SMOPendulumTracking-v0")
 @pytest.fixture(params=IDS)
 def env_id(request):
     return request.param
+
+
+@pytest.fixture
+def registry():
+    """The arms, left as they were."""
+    known = dict(ARMS)
+    yield ARMS
+    ARMS.clear()
+    ARMS.update(known)
 
 
 @pytest.fixture

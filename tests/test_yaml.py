@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from smo_gym import files
-from smo_gym.evaluation import configs, scenario, study
+from smo_gym.evaluation import arms, configs, scenario, study
 
 ROOT = Path(__file__).resolve().parent.parent
 REGULATION = "extends: regulation\n"
@@ -115,4 +115,4 @@ def test_more_runs_than_can_be_done_are_refused_at_once():
     one = scenario.named("regulation")
     for runs in (10**6, 10**12, 10**400):
         with pytest.raises(ValueError, match=r"runs=.* take fewer runs, levels or initial states"):
-            study.groups([one], ["lqr"], study.ARMS, runs)
+            study.groups([one], ["lqr"], arms.ARMS, runs)

@@ -16,6 +16,9 @@ OBSERVER_GAINS = {
 }
 """Table 3, one entry a column: (m_11, m_12), (beta_{1,1}, beta_{2,1}), (beta_{1,2}, beta_{2,2})."""
 
+WITHOUT, WITH = "without", "with"
+"""The tables' column ``compensation``: whether the observer has that of the input uncertainty (Remark 3)."""
+
 SMC_GAINS = {"Z0": 26.0, "lam": 30.0, "epsilon": 0.1460}
 """Table 6 (printed for tracking; the article does not say whether regulation used them)."""
 

@@ -10,7 +10,7 @@ from importlib import resources
 
 import numpy as np
 
-from . import published
+from . import WITH, WITHOUT, published
 
 REGULATION = ("4",)  # the only regulation table with RMS columns
 
@@ -80,7 +80,7 @@ def _summaries() -> Iterator[Check]:
             case = None if line["row"] == "average" else line["row"]
             recomputed = _reduction(table, line["controller"], metric, state, case)
             if case is None:
-                without, with_ = (_column(table, line["controller"], metric, state, arm) for arm in ("without", "with"))
+                without, with_ = (_column(table, line["controller"], metric, state, arm) for arm in (WITHOUT, WITH))
                 alternative = float(np.mean(100.0 * (1.0 - with_ / without)))
         else:
             recomputed = float(np.mean(_column(table, line["controller"], quantity, state, line["compensation"])))
@@ -114,5 +114,5 @@ def _column(table: str, controller: str, metric: str, state: str, arm: str, case
 
 def _reduction(table: str, controller: str, metric: str, state: str, case: str | None = None) -> float:
     """In percent, of the averages over rows."""
-    without, with_ = (np.mean(_column(table, controller, metric, state, arm, case)) for arm in ("without", "with"))
+    without, with_ = (np.mean(_column(table, controller, metric, state, arm, case)) for arm in (WITHOUT, WITH))
     return float(100.0 * (1.0 - with_ / without))

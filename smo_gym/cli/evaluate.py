@@ -20,19 +20,20 @@ import yaml
 from tqdm import tqdm
 
 from .. import files
+from ..article import WITH, WITHOUT
 from ..evaluation import configs, scenario, study
+from ..evaluation.arms import ARMS, EVERY, PRINTED, SMO
 from ..evaluation.report import figures, page, tables
 from ..evaluation.statistics import Result, results
 from ..policies import named
-from ..validation import unknown
+from ..validation import choice, unknown
 from .arguments import Parser, fraction, one_of, positive, several, versions
 from .entry import Stop, command, said, typed
 from .progress import simulated
 
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
-OBSERVERS = ("smo", "theorem", "oracle")
 RESULTS = ("results.csv", "runs.csv", "tables.md", "tables.tex", "reference.json", "settings.yaml")
-COMPENSATION = {"on": ("with",), "off": ("without",), "both": ("without", "with")}
+COMPENSATION = {"on": (WITH,), "off": (WITHOUT,), "both": PRINTED}
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -59,7 +60,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         nargs="+",
         default=[],
         metavar="MODULE",
-        help="that registers environments of your own",
+        help="that registers environments, or arms with observers, of your own",
     )
     add("--config", type=Path, metavar="FILE", help="a scenario file of your own in place of --scenario")
     add(
@@ -72,9 +73,10 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.seed("the random plants")
     add(
         "--observer",
-        type=one_of("observer", (*OBSERVERS, "all")),
-        default="smo",
-        help="smo (default), theorem (gains designed for it), oracle (the true state) or all",
+        default=SMO,
+        metavar="NAME",
+        help="smo (default), theorem (gains designed for it), oracle (the true state), an arm that an imported module "
+        "registers, or all",
     )
     add(
         "--compensation",
@@ -136,14 +138,14 @@ def chosen_arms(observer: str, compensation: str | None) -> list[str]:
     """The arms of the comparison.
 
     Raises:
-        ValueError: compensation is asked of an observer that has no such switch.
+        ValueError: no arm has such an observer, or compensation is asked of one that has no such switch.
     """
-    if observer in ("theorem", "oracle"):
+    others = [name for name in ARMS if name not in PRINTED]
+    if choice("observer", observer, (SMO, *others, EVERY)) in others:
         if compensation is not None:
             raise ValueError(f"--compensation {compensation} is for the observer smo, not --observer {observer}")
         return [observer]
-    others = OBSERVERS[1:] if observer == "all" else ()
-    return [*COMPENSATION[compensation or "both"], *others]
+    return [*COMPENSATION[compensation or "both"], *(others if observer == EVERY else ())]
 
 
 @command("evaluate")
@@ -154,8 +156,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     sys.path.append(os.getcwd())  # where an agent of one's own usually is
     for module in args.modules:
         named.imported(module)
-    scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
     arms = chosen_arms(args.observer, args.compensation)
+    scenarios, controllers, left_out_agents = chosen(load(args), args.controller)
     groups = study.groups(scenarios, controllers, arms, args.runs)
     drawn, left_out = figures.planned(groups) if args.figures else ([], [])
     drawings = [drawing(plan, form) for plan in drawn for form in figures.FORMATS]

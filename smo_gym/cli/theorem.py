@@ -22,6 +22,7 @@ from tabulate import tabulate
 from tqdm import tqdm
 
 from .. import (
+    LQR,
     CartPendulum,
     Gains,
     SlidingModeController,
@@ -31,9 +32,9 @@ from .. import (
     theorem,
 )
 from ..evaluation import configs, rollout, scenario
-from ..evaluation.rollout import Traces
 from ..evaluation.scenario import Scenario, TheoremSettings
 from ..evaluation.theorem_on_runs import SHARES, Convergence, converge
+from ..evaluation.traces import Traces
 from .arguments import Parser
 from .entry import command
 
@@ -99,10 +100,12 @@ def parts(
         ),
         "printed": printed,
     }
+    law = article.agent("lqr")
+    assert isinstance(law, LQR)
     with tqdm(total=round(settings.horizon.value / DT), desc="samples", leave=False, disable=None) as bar:
         found = converge(
             observers,
-            article.agent("lqr"),
+            law,
             over,
             starts,
             plants,
@@ -203,7 +206,9 @@ def with_tanh(found: Convergence, settle: float) -> None:
 def along(article: Scenario, controller: str) -> Traces:
     """Runs of Table 5's cases on the nominal plant, with compensation."""
     observer, cases = article.controllers[controller].observer, article.initial_states.value
-    env = gymnasium.make_vec("SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.options)
+    env = gymnasium.make_vec(
+        "SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.environment_options
+    )
     observed = VectorObserverWrapper(env, observer.build(compensation=True))
     plants = np.repeat(CartPendulum().as_array()[None], len(cases), axis=0)
     options = {"state": np.array(list(cases.values())), "params": plants}

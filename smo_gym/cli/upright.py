@@ -13,18 +13,18 @@ from scipy import stats
 from tabulate import tabulate
 
 from .. import files
+from ..article import WITHOUT
 from ..evaluation import configs, scenario, study
+from ..evaluation.arms import ARMS, THEOREM
 from ..evaluation.formats import as_csv, markdown
 from .arguments import Parser
 from .entry import command
 from .progress import simulated
 
 RESULTS = ("falls.csv", "falls.md")
-ARMS = {
-    "without": "printed gains, without compensation",
-    "with": "with compensation",
-    "theorem": "designed gains",
-    "oracle": "true state",
+TITLES = {arm.name: arm.title for arm in ARMS.values()} | {
+    WITHOUT: "printed gains, without compensation",
+    THEOREM: "designed gains",
 }
 
 
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.out(None, "folder for falls.csv and falls.md")
     args = parser.parse_args(arguments)
     place = scenario.load(args.config)
-    groups = [g for g in study.groups([place], list(place.controllers), list(ARMS), args.runs) if g.uncertainty > 0.0]
+    groups = [g for g in study.groups([place], list(place.controllers), list(TITLES), args.runs) if g.uncertainty > 0.0]
     with contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS) as out:
         with simulated(groups) as bar:
             outcomes = study.measure(groups, args.seed, bar.update)
@@ -59,9 +59,9 @@ def table(outcomes: Sequence[study.Outcome], form: str) -> str:
     for group, falls, runs, low, high in counts(outcomes):
         text = f"{100 * falls / runs:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
         cells.setdefault((group.case, f"{100 * group.uncertainty:g} %"), {})[group.arm] = text
-    rows = [(*place, *(by_arm[arm] for arm in ARMS)) for place, by_arm in cells.items()]
+    rows = [(*place, *(by_arm[arm] for arm in TITLES)) for place, by_arm in cells.items()]
     rows.sort(key=lambda row: row[0])  # starts, each with its levels in order
-    return tabulate(rows, ("start, rad", "uncertainty", *ARMS.values()), tablefmt=form, disable_numparse=True)
+    return tabulate(rows, ("start, rad", "uncertainty", *TITLES.values()), tablefmt=form, disable_numparse=True)
 
 
 def data(outcomes: Sequence[study.Outcome]) -> str:

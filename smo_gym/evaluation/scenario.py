@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import VectorEnv
 from pydantic import Field, field_validator, model_validator
 
 from .. import files
@@ -16,6 +17,7 @@ from ..controllers import Agent, title
 from ..envs.stepping import checked_force
 from ..envs.task import Task
 from ..reference import Reference, ReferenceNotFound, minimum_energy, shipped
+from ..typing import Array
 from ..validation import limit, number
 from ..wrappers import VectorObserverWrapper
 from . import configs, reading
@@ -28,6 +30,7 @@ from .settings import (
     Fraction,
     Horizon,
     Name,
+    OptionSettings,
     Period,
     PolicySettings,
     ReferenceSettings,
@@ -37,13 +40,15 @@ from .settings import (
     TheoremSettings,
 )
 
+MOST_SUBSTEPS = 10_000
+"""Integration steps in a control period: all of their instants are in memory at once."""
 __all__ = ["ControllerSettings", "Scenario", "Setting", "TheoremSettings", "entered", "load", "load_theorem", "named"]
 
 
 class Scenario(Settings):
     """One table: its environment, its rows (uncertainty levels times initial states) and its controllers.
 
-    ``suffix`` is what the published data appends to a controller's name.
+    ``suffix`` is what the published data appends to a controller's name; ``options`` go to the environment as they are.
     """
 
     table: Name
@@ -59,6 +64,7 @@ class Scenario(Settings):
     controllers: Annotated[dict[Name, ControllerSettings], Field(min_length=1)]
     designed: DesignSettings | None = None
     reference: ReferenceSettings | None = None
+    options: OptionSettings = Field(default_factory=dict)
 
     @field_validator("environment")
     @classmethod
@@ -106,16 +112,35 @@ class Scenario(Settings):
         return _reference(*wanted)
 
     @property
-    def options(self) -> dict[str, Any]:
-        """Options of the environment."""
+    def environment_options(self) -> dict[str, Any]:
+        """All options of the environment."""
         tracking = {} if self.reference is None else {"reference": self.trajectory(), "preview": 0}
         return {
             **tracking,
+            **{name: setting.value for name, setting in self.options.items()},
             "control_period": self.control_period.value,
             "horizon": self.horizon.value,
             "force_limit": self.force_limit.value,
             "track_limit": self.track_limit.value,
         }
+
+    def make(self) -> VectorEnv[Array, Array, Array]:
+        """One slot of the environment, to ask and to try things in.
+
+        Raises:
+            ValueError: an option is unknown, or its value is not allowed.
+        """
+        try:
+            return gymnasium.make_vec(self.environment, 1, **self.environment_options)
+        except (ValueError, TypeError, ArithmeticError) as error:
+            given = f"with options.{', options.'.join(self.options)}: " if self.options else ""
+            raise ValueError(f"{given}{error}") from error
+
+    @property
+    def task(self) -> Task:
+        """What the environment makes of the options; ``task.params`` is the nominal plant."""
+        task: Task = self.make().unwrapped.task  # type: ignore[attr-defined]
+        return task
 
     def agent(self, controller: str) -> Agent:
         """A controller, made anew."""
@@ -225,19 +250,21 @@ def _try(scenario: Scenario, wanted: Collection[str]) -> None:
     """Make everything once, so that a value that is not allowed is noticed before any run."""
     if scenario.reference is not None and len(scenario.initial_states.value) != 1:
         raise ValueError("initial_states must hold one state: a reference begins at one")
+    env = scenario.make()
+    task: Task = env.unwrapped.task  # type: ignore[attr-defined]
+    if "dt" in scenario.options and task.substeps > MOST_SUBSTEPS:
+        raise ValueError(f"options.dt={task.dt:g} is less than a {MOST_SUBSTEPS:,}th of the control period")
     for name, settings in scenario.controllers.items():
         if settings.law != "policy" or {name, settings.law, "all"} & {*wanted}:
             _try_controller(scenario, name)
     if scenario.designed is not None:
-        env = gymnasium.make_vec(scenario.environment, 1, **scenario.options)
-        task: Task = env.unwrapped.task  # type: ignore[attr-defined]
         VectorObserverWrapper(env, scenario.designed.build(task.dt, task.params))
 
 
 def _try_controller(scenario: Scenario, name: str) -> None:
     """Two slots' first forces from a controller."""
     agent = scenario.agent(name)
-    options = {**scenario.options, "control_period": scenario.period(agent)}
+    options = {**scenario.environment_options, "control_period": scenario.period(agent)}
     env = gymnasium.make_vec(scenario.environment, 2, **options)
     observation, _ = VectorObserverWrapper(env, scenario.controllers[name].observer.build(True)).reset(seed=0)
     try:

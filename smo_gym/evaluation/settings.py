@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from ..controllers import LQR, Agent, SlidingModeController
 from ..observers import Gains, SlidingModeObserver
@@ -218,6 +218,28 @@ class TheoremSettings(DesignSettings):
         if self.gains is not None:
             Gains.of(self.gains.value)
         return self
+
+
+ELSEWHERE = {
+    **{name: name for name in ("control_period", "horizon", "force_limit", "track_limit", "reference", "uncertainty")},
+    "initial_state": "initial_states",
+}
+"""Options of the environment that a scenario has settings of its own for, and which."""
+OF_A_BATCH = ("num_envs", "vectorization_mode", "vector_kwargs", "wrappers", "autoreset_mode", "max_episode_steps")
+"""What :func:`gymnasium.make_vec` takes for itself."""
+
+
+def _for_a_task(options: dict[str, Setting[Any]]) -> dict[str, Setting[Any]]:
+    for name in options:
+        if name in ELSEWHERE:
+            raise ValueError(f"{name!r} does not belong here: it is the scenario's own setting {ELSEWHERE[name]!r}")
+        if name in (*OF_A_BATCH, "render_mode"):
+            raise ValueError(f"{name!r} does not belong here: it is of how episodes are run, not of what they are")
+    return options
+
+
+OptionSettings = Annotated[dict[Name, Setting[Any]], AfterValidator(_for_a_task)]
+"""Options of the environment by name."""
 
 
 class ReferenceSettings(Settings):

@@ -11,7 +11,8 @@ from scipy import stats
 
 from ..article import Cell, published
 from ..typing import Array, Flags
-from .study import ARMS, Outcome
+from .arms import ARMS, PRINTED
+from .study import Outcome
 from .verdicts import PRINTED_RUNS, ceiling
 
 
@@ -136,7 +137,7 @@ def _published(rows: Sequence[Outcome], cell: Cell) -> float:
 
 def _reduction(rows: Sequence[Outcome], state: str, uncertainty: str, case: str) -> list[Result]:
     """What the compensation takes off the MSE, in percent, over runs that failed in neither arm."""
-    arms = {arm: [row for row in rows if row.group.arm == arm] for arm in ("without", "with")}
+    arms = {arm: [row for row in rows if row.group.arm == arm] for arm in PRINTED}
     if not all(arms.values()):
         return []
     (without, ok_without), (with_, ok_with) = (_runs(arm, state) for arm in arms.values())

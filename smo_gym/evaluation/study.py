@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from reprlib import repr as short
 from typing import Any
@@ -12,16 +12,15 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from ..envs.task import Task
-from ..plant import STATE_NAMES, CartPendulum
+from ..observers import Compiled, Observer
+from ..plant import STATE_NAMES
 from ..typing import Array, Flags
-from ..validation import choice
 from ..wrappers import VectorObserverWrapper
+from .arms import arm
 from .rollout import rollout
 from .scenario import ControllerSettings, Scenario
 from .traces import Traces
 
-ARMS = ("without", "with", "theorem", "oracle")
-"""Compensation of the input uncertainty off, on; gains designed for the theorem; the true state for an estimate."""
 TRACED_RUNS = 10
 """Of each group at most so many runs are traced, the first ones: as many as the article shows."""
 MOST_RUNS = 10_000_000
@@ -41,7 +40,7 @@ class Group:
     runs: int
 
     def __post_init__(self) -> None:
-        choice("arm", self.arm, ARMS)
+        arm(self.arm)
 
     @property
     def name(self) -> str:
@@ -70,16 +69,18 @@ class Outcome:
 
     @property
     def left(self) -> Flags | None:
-        """Which runs left the operating set that the theorem's gains are designed for, (runs,); None in other arms."""
+        """Which runs left the operating set that an arm's gains are designed for, (runs,); None in other arms."""
         designed = self.group.scenario.designed
-        if self.group.arm != "theorem" or designed is None:
+        if designed is None or not arm(self.group.arm).designed:
             return None
         zero = np.zeros_like(self.metrics["peak_theta"])
         x, xhat = (
             np.array([zero, *(self.metrics[f"{peak}_{name}"] for name in STATE_NAMES[1:])])
             for peak in ("peak", "peak_estimate")
         )
-        return ~designed.over(CartPendulum()).holds(x, xhat) | (self.metrics["peak_force"] > designed.force.value)
+        return ~designed.over(self.group.scenario.task.params).holds(x, xhat) | (
+            self.metrics["peak_force"] > designed.force.value
+        )
 
 
 def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequence[str], runs: int) -> list[Group]:
@@ -90,23 +91,17 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
             runs than can be done.
     """
     scenarios = list(scenarios)
-    for arm in arms:
-        choice("arm", arm, ARMS)
-    for scenario in scenarios:
-        if "theorem" in arms and scenario.designed is None:
-            raise ValueError(f"scenario {scenario.title!r} has no setting 'designed' for the theorem's gains")
-        if "theorem" in arms and max(scenario.uncertainty.value) > scenario.designed.operating_set.uncertainty.value:  # type: ignore[union-attr]
-            raise ValueError(
-                f"uncertainty={scenario.uncertainty.value} is beyond what the theorem's gains are designed for"
-            )
+    for chosen in map(arm, arms):
+        for scenario in scenarios:
+            chosen.check(scenario)
     found = [
-        Group(scenario, controller, level, case, arm, runs if level > 0.0 else 1)
+        Group(scenario, controller, level, case, name, runs if level > 0.0 else 1)
         for scenario in scenarios
         for controller in controllers
         if controller in scenario.controllers
         for level in sorted({0.0, *scenario.uncertainty.value})
         for case in scenario.initial_states.value
-        for arm in arms
+        for name in arms
     ]
     if sum(group.runs for group in found) > MOST_RUNS or simulated_seconds(found) > MOST_SECONDS:
         raise ValueError(
@@ -144,11 +139,11 @@ def measure(
     """
     if samples is not None and samples < 1:
         raise ValueError(f"samples={samples!r} must be a positive integer")
-    options = {id(group.scenario): group.scenario.options for group in wanted}
+    options = {id(group.scenario): group.scenario.environment_options for group in wanted}
     batches: dict[Any, list[int]] = {}
-    for index, group in enumerate(wanted):
+    for index, (group, observer) in enumerate(zip(wanted, _observers(wanted), strict=True)):
         scenario = group.scenario
-        key = (scenario.environment, repr(options[id(scenario)]), repr(group.settings), _together(group.arm))
+        key = (scenario.environment, repr(options[id(scenario)]), repr(group.settings), observer)
         batches.setdefault(key, []).append(index)
     outcomes: dict[int, Outcome] = {}
     for indices in batches.values():
@@ -158,9 +153,28 @@ def measure(
     return [outcomes[index] for index in range(len(wanted))]
 
 
-def _together(arm: str) -> str:
-    """Arms that can share a batch: their observers have one step."""
-    return "smo" if arm in ("without", "with") else arm
+def _observers(wanted: Iterable[Group]) -> list[Hashable]:
+    """What kind of observer each group has: equal for those that can share a batch.
+
+    Raises:
+        ValueError: an arm's observer cannot work in a scenario.
+    """
+    envs: dict[int, VectorEnv[Array, Array, Array]] = {}
+    found: dict[tuple[int, str, str], Observer] = {}
+    places = []
+    for group in wanted:
+        scenario = group.scenario
+        places.append((id(scenario), group.controller, group.arm))
+        if id(scenario) not in envs:
+            envs[id(scenario)] = scenario.make()
+        if places[-1] not in found:
+            found[places[-1]] = arm(group.arm).tried(group.settings.observer, scenario, envs[id(scenario)])
+    return [_kind(found[place]) for place in places]
+
+
+def _kind(observer: Observer) -> Hashable:
+    """Compiled observers of all kinds share a batch; others, asked once a control period, are alone in theirs."""
+    return Compiled if isinstance(observer, Compiled) else id(observer)
 
 
 def simulated_seconds(wanted: Iterable[Group]) -> float:
@@ -175,7 +189,7 @@ def _run(
     progress: Callable[[float], object],
     samples: int | None,
 ) -> list[Outcome]:
-    scenario, settings = batch[0].scenario, batch[0].settings
+    scenario = batch[0].scenario
     agent = scenario.agent(batch[0].controller)
     dt = scenario.period(agent)
     n = sum(group.runs for group in batch)
@@ -187,16 +201,12 @@ def _run(
     draws = deviations(seed, max(group.runs for group in batch))
     states, plants, observers = [], [], []
     for group in batch:
-        if group.arm == "theorem":
-            assert scenario.designed is not None  # groups() has seen to it
-            observer = scenario.designed.build(task.dt, nominal)
-        else:
-            observer = settings.observer.build(group.arm == "with")
+        observer: Any = arm(group.arm).observer(group.settings.observer, group.scenario, task)
         for draw in draws[: group.runs]:
             states.append(group.scenario.initial_states.value[group.case])
             plants.append(nominal.perturbed(group.uncertainty * draw).as_array())
             observers.append(observer)
-    observed = VectorObserverWrapper(env, "oracle" if batch[0].arm == "oracle" else observers)
+    observed = VectorObserverWrapper(env, observers)
     edges = np.cumsum([group.runs for group in batch])[:-1]
     slots = [part[:TRACED_RUNS] for part in np.split(np.arange(n), edges)]
     params = np.array(plants)

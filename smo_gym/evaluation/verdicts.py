@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..article import WITH, WITHOUT
 from ..typing import Array
 from .study import Outcome
 
@@ -37,8 +38,8 @@ def costs(outcomes: Sequence[Outcome]) -> list[str]:
     pairs: dict[tuple[str, str], list[tuple[Outcome, Outcome]]] = {}
     arms = {(o.group.scenario.table, o.group.name, o.group.uncertainty, o.group.case, o.group.arm): o for o in outcomes}
     for (*place, arm), outcome in arms.items():
-        other = arms.get((*place, "with"))  # type: ignore[arg-type]
-        if arm == "without" and other is not None and outcome.group.uncertainty > 0.0:
+        other = arms.get((*place, WITH))  # type: ignore[arg-type]
+        if arm == WITHOUT and other is not None and outcome.group.uncertainty > 0.0:
             pairs.setdefault((str(place[0]), str(place[1])), []).append((outcome, other))
     return [f"Table {table}, {name}: {_cost(both)}" for (table, name), both in pairs.items()]
 

@@ -9,14 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from ..article import WITH, WITHOUT
 from ..evaluation import study
+from ..evaluation.arms import ORACLE
 from ..evaluation.guard import DIVERGED
 from ..evaluation.scenario import Scenario
 from ..policies.frozen import Card, MlpPolicy
 from ..typing import Array, Flags
 
 ALGORITHMS = {"ppo": "PPO", "recurrent": "RecurrentPPO"}
-ARMS = {"smo": "with", "smo-uncompensated": "without", "state": "oracle"}
+ARM_OF = {"smo": WITH, "smo-uncompensated": WITHOUT, "state": ORACLE}
 """Which observer stands for a kind of observation. Policies on positions do not look at the oracle."""
 FAILED = 2.0 * DIVERGED**2
 """The score of a run that failed: the worst. No other run has more, since its h and theta stay below DIVERGED."""
@@ -96,7 +98,7 @@ def _alike(path: Path, card: Card, seeds: dict[int, tuple[str, Card]]) -> None:
 
 def designed(scenario: Scenario) -> list[Contender]:
     """The scenario's own controllers on each kind of estimate."""
-    return [Contender(name.upper(), kind, (name,)) for name in scenario.controllers for kind in ARMS]
+    return [Contender(name.upper(), kind, (name,)) for name in scenario.controllers for kind in ARM_OF]
 
 
 def entered(scenario: Scenario, contenders: Iterable[Contender]) -> Scenario:
@@ -116,7 +118,7 @@ def entered(scenario: Scenario, contenders: Iterable[Contender]) -> Scenario:
 def groups(scenario: Scenario, contender: Contender, runs: int) -> list[study.Group]:
     """The runs of a contender: policies times levels."""
     (case,) = scenario.initial_states.value
-    arm = ARMS.get(contender.observation, "oracle")
+    arm = ARM_OF.get(contender.observation, ORACLE)
     levels = scenario.uncertainty.value
     return [study.Group(scenario, name, level, case, arm, runs) for name in contender.names for level in levels]
 

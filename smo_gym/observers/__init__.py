@@ -2,9 +2,9 @@
 
 from .estimator import start_each
 from .oracle import Oracle
-from .protocol import Estimator, Observer
+from .protocol import Compiled, Estimator, Observer
 from .sliding_mode import Gains, SlidingModeObserver
 
 OBSERVERS = {"smo": SlidingModeObserver, "oracle": Oracle}
 
-__all__ = ["OBSERVERS", "Estimator", "Gains", "Observer", "Oracle", "SlidingModeObserver", "start_each"]
+__all__ = ["OBSERVERS", "Compiled", "Estimator", "Gains", "Observer", "Oracle", "SlidingModeObserver", "start_each"]

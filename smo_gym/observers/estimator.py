@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 
@@ -75,21 +76,22 @@ class Several:
                 see(slots[mine], x[:, mine])
 
 
+def _runs(observers: Sequence[Observer]) -> list[tuple[Observer, int]]:
+    """Neighbouring slots that have the very same observer, as that and their number."""
+    runs = [list(run) for _, run in groupby(observers, id)]
+    return [(run[0], len(run)) for run in runs]
+
+
 def parts_of(observers: Sequence[Observer], dt: float, force: float, nominal: CartPendulum) -> list[Part] | None:
     """What observers, one a slot, put into a loop, equal kinds as one; None where one of them is not compiled.
 
     Raises:
         ValueError: an observer cannot work with these.
     """
-    distinct = {id(observer): observer for observer in observers}
-    if not all(isinstance(observer, Compiled) for observer in distinct.values()):
+    runs = _runs(observers)
+    if not all(isinstance(observer, Compiled) for observer, _ in runs):
         return None
-    parts = {
-        key: observer.part(1, dt, force, nominal)
-        for key, observer in distinct.items()
-        if isinstance(observer, Compiled)
-    }
-    return side_by_side(parts[id(observer)] for observer in observers)
+    return side_by_side(observer.part(n, dt, force, nominal) for observer, n in runs if isinstance(observer, Compiled))
 
 
 def start_each(observers: Sequence[Observer], dt: float, force: float, nominal: CartPendulum) -> Estimator:
@@ -103,8 +105,7 @@ def start_each(observers: Sequence[Observer], dt: float, force: float, nominal: 
         return BlockEstimator(parts, len(observers))
     each: list[tuple[slice, Estimator]] = []
     start = 0
-    for stop in range(1, len(observers) + 1):
-        if stop == len(observers) or observers[stop] is not observers[start]:
-            each.append((slice(start, stop), observers[start].start(stop - start, dt, force, nominal)))
-            start = stop
+    for observer, n in _runs(observers):
+        each.append((slice(start, start + n), observer.start(n, dt, force, nominal)))
+        start += n
     return Several(each)

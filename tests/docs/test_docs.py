@@ -29,6 +29,7 @@ SECTIONS = (
 BLOCK = re.compile(r'^```(\w+)(?: title="(.+?)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.usefixtures("registry")
 @pytest.mark.parametrize("page", EXECUTED)
 def test_examples_print_what_the_page_says(page, tmp_path, monkeypatch, capsys):
     for folder in ("agents", "configs"):

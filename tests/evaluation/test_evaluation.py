@@ -171,7 +171,7 @@ def test_a_study_is_what_single_runs_give(small):
     for arm in ("without", "with", "oracle"):
         (outcome,) = (o for o in outcomes if o.group.arm == arm and o.group.uncertainty == 0.2)
         settings = {} if arm == "oracle" else {"compensation": arm == "with", "slopes": (12.0, 12.0)}
-        env = gymnasium.make("SMOPendulum-v0", **small.options)
+        env = gymnasium.make("SMOPendulum-v0", **small.environment_options)
         env = smo_gym.ObserverWrapper(env, "oracle" if arm == "oracle" else "smo", **settings)
         plant = CartPendulum().perturbed(0.2 * delta)
         observation, _ = env.reset(options={"state": [1.0, 1.0, 0.1, 0.01], "params": plant})

@@ -48,7 +48,7 @@ def runs(one, name, start, plants, xhat0=None):
     """MSEs and failures of a scenario's controller with compensation from one start on some plants."""
     observer = one.controllers[name].observer.build(compensation=True)
     observer = observer if xhat0 is None else replace(observer, xhat0=xhat0)
-    env = gymnasium.make_vec(one.environment, len(plants), autoreset_mode="Disabled", **one.options)
+    env = gymnasium.make_vec(one.environment, len(plants), autoreset_mode="Disabled", **one.environment_options)
     options = {"state": np.tile(np.asarray(start, dtype=float), (len(plants), 1)), "params": plants}
     return rollout(VectorObserverWrapper(env, observer), one.agent(name), options=options)
 

@@ -14,19 +14,19 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from ...article import Cell, published
+from ...article import WITH, Cell, published
 from ...controllers import LQR, Agent, SlidingModeController
 from ...observers import SlidingModeObserver
 from ...plant import CartPendulum
 from ...typing import Array
 from ...wrappers import VectorObserverWrapper
+from ..arms import PRINTED
 from ..rollout import rollout
 from ..scenario import Scenario
 from ..settings import LqrSettings, SmcSettings
 from ..study import deviations as draws
 from .search import Hypothesis
 
-ARMS = ("without", "with")
 STATES = ("h", "theta")
 # A run that diverges counts as a hundredfold MSE, so that the search leads away from it.
 _DIVERGED = math.log(100.0)
@@ -61,7 +61,7 @@ def _mse(
         (
             replace(
                 observer,
-                compensation=arm == "with",
+                compensation=arm == WITH,
                 time_constant=hypothesis.time_constant,
                 xhat0=tuple(x0) if hypothesis.estimate_starts_at_truth else observer.xhat0,
             ),
@@ -70,10 +70,10 @@ def _mse(
         )
         for observer, cases in zip(observers, starts, strict=True)
         for x0 in cases
-        for arm in ARMS
+        for arm in PRINTED
         for plant in plants
     ]
-    options: dict[str, Any] = {**scenario.options, "track_limit": 50.0}
+    options: dict[str, Any] = {**scenario.environment_options, "track_limit": 50.0}
     if scenario.reference is None:
         options["params"] = CartPendulum(gravity=hypothesis.gravity)
     env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
@@ -88,7 +88,7 @@ def _mse(
     )
     errors = np.stack([found.metrics[f"mse_{s}"] for s in STATES], axis=-1)
     errors[found.failed] = np.nan
-    return errors.reshape(m, cases, len(ARMS), len(plants), len(STATES))
+    return errors.reshape(m, cases, len(PRINTED), len(plants), len(STATES))
 
 
 def _plants(scenario: Scenario, each: int, gravity: float = -9.8) -> Array:
@@ -126,17 +126,17 @@ def _averages(table: str, controller: str, levels: Sequence[float]) -> list[list
             float(np.mean([_printed(Cell(table, controller, f"{100 * x:g}", "", "mse", s, arm)) for x in levels]))
             for s in STATES
         ]
-        for arm in ARMS
+        for arm in PRINTED
     ]
 
 
 def _table5(controller: str, cases: Sequence[str]) -> list[Any]:
     """Published cells by case, arm and state."""
-    return [[[_printed(Cell("5", controller, "", c, "mse", s, arm)) for s in STATES] for arm in ARMS] for c in cases]
+    return [[[_printed(Cell("5", controller, "", c, "mse", s, arm)) for s in STATES] for arm in PRINTED] for c in cases]
 
 
 def _labels(first: Sequence[str]) -> list[str]:
-    return [f"{one}, {arm}, {state}" for one in first for arm in ARMS for state in STATES]
+    return [f"{one}, {arm}, {state}" for one in first for arm in PRINTED for state in STATES]
 
 
 class Lqr:

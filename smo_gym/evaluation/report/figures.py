@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
+from ..arms import PRINTED
 from ..statistics import Result
 from ..study import TRACED_RUNS, Group, Outcome
 from . import panels
@@ -63,7 +64,7 @@ class Plan:
 
     def shows(self, group: Group) -> bool:
         """Whether runs of a group belong to it, at some level of uncertainty."""
-        place = (group.scenario.table == self.table, group.name in self.controllers, group.arm in panels.ARMS)
+        place = (group.scenario.table == self.table, group.name in self.controllers, group.arm in PRINTED)
         return all(place) and self.case in (None, group.case)
 
 
@@ -157,7 +158,7 @@ def _said(shown: Sequence[Outcome]) -> str:
 def _bars(plan: Plan, results: Iterable[Result]) -> tuple[Figure, str]:
     """A figure of the cells of a table; of the nominal plant beside levels of uncertainty, not beside cases."""
     shown = [r for r in results if r.cell.table == plan.table and r.cell.metric == "mse" and not r.cell.is_average]
-    shown = [r for r in shown if r.cell.compensation in panels.ARMS]
+    shown = [r for r in shown if r.cell.compensation in PRINTED]
     shown = [r for r in shown if not (r.cell.case and r.cell.uncertainty_percent == "0")]
     columns = {name: [r for r in shown if r.cell.controller == name] for name in plan.controllers}
     label = "initial state" if plan.table == "5" else "uncertainty (%)"

@@ -18,8 +18,9 @@ from typing import Any
 
 from ... import files
 from .. import formats
+from ..arms import ARMS
 from ..statistics import Result, place
-from ..study import ARMS, Group, Outcome
+from ..study import Group, Outcome
 from . import page_figures, tables
 from .page_traces import CHANNELS, LEVELS, pack, runs_that_fit
 from .panels import WINDOW
@@ -86,10 +87,8 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         data={
             "channels": CHANNELS,
             "levels": LEVELS.tolist(),
-            "colours": {
-                arm: [colour, page_figures.COLOURS_ON_DARK[arm]] for arm, colour in page_figures.COLOURS.items()
-            },
-            "arms": page_figures.ARM_NAMES,
+            "colours": {arm.name: [arm.colour, arm.colour_on_dark] for arm in ARMS.values()},
+            "arms": {arm.name: arm.title for arm in ARMS.values()},
             "groups": groups,
         },
         figures=Markup(_json(figures)),
@@ -100,7 +99,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         most=max(len(outcome.failed) for outcome in outcomes),
         tables=_tables(outcomes, results),
         bars=list(figures["bars"]),
-        arms={arm: page_figures.ARM_NAMES[arm] for arm in ARMS if any(o.group.arm == arm for o in outcomes)},
+        arms={arm.name: arm.title for arm in ARMS.values() if any(o.group.arm == arm.name for o in outcomes)},
         rms=any(r.cell.metric == "rms" for r in results),
         header=header,
         diagnosed=diagnosed,

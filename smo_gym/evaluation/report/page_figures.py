@@ -8,23 +8,13 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from .. import formats
+from ..arms import ARMS
 from ..statistics import Result
-from ..study import ARMS
 from . import tables
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-COLOURS = {"without": "#D55E00", "with": "#0072B2", "theorem": "#009E73", "oracle": "#B35C92"}
-"""Of the arms, after Okabe and Ito: told apart by the colour-blind."""
-COLOURS_ON_DARK = {"without": "#F08A3C", "with": "#56B4E9", "theorem": "#2CC295", "oracle": "#E39AC8"}
-"""The same on dark ground."""
-ARM_NAMES = {
-    "without": "without compensation",
-    "with": "with compensation",
-    "theorem": "theorem's gains",
-    "oracle": "true state",
-}
 AXES = {
     "positions": ("h (m)", "θ (rad)", "h − ĥ (m)", "θ − θ̂ (rad)", "F (N)"),
     "velocities": ("h′ (m/s)", "θ′ (rad/s)", "h′ − ĥ′ (m/s)", "θ′ − θ̂′ (rad/s)", "F (N)"),
@@ -95,17 +85,17 @@ def scatter(results: Sequence[Result]) -> Figure | None:
             )
         )
     for symbol, name in zip(_SYMBOLS * len(cells), dict.fromkeys(r.cell.controller for r in cells), strict=False):
-        for arm in ARMS:
-            chosen = [r for r in cells if (r.cell.controller, r.cell.compensation) == (name, arm)]
+        for arm in ARMS.values():
+            chosen = [r for r in cells if (r.cell.controller, r.cell.compensation) == (name, arm.name)]
             if chosen:
                 figure.add_trace(
                     Scatter(
                         x=[r.published for r in chosen],
                         y=[r.measured for r in chosen],
-                        error_y=_interval(chosen) | {"thickness": 1, "width": 0, "color": COLOURS[arm]},
+                        error_y=_interval(chosen) | {"thickness": 1, "width": 0, "color": arm.colour},
                         mode="markers",
-                        marker={"symbol": symbol, "size": 8, "color": COLOURS[arm], "opacity": 0.85},
-                        name=html.escape(f"{tables.title(name)}, {arm}"),
+                        marker={"symbol": symbol, "size": 8, "color": arm.colour, "opacity": 0.85},
+                        name=html.escape(f"{tables.title(name)}, {arm.name}"),
                         text=[
                             html.escape(formats.line(f"Table {r.cell.table}, {tables.label(r.cell)}, {r.cell.state}"))
                             for r in chosen
@@ -132,20 +122,22 @@ def _bars(cells: Sequence[Result]) -> Figure:
 
     figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
     for row, state in ((1, "h"), (2, "theta")):
-        for arm in ARMS:
-            chosen = [r for r in cells if (r.cell.state, r.cell.compensation) == (state, arm)]
+        for arm in ARMS.values():
+            chosen = [r for r in cells if (r.cell.state, r.cell.compensation) == (state, arm.name)]
             places = [html.escape(formats.line(tables.label(r.cell))) for r in chosen]
-            look = {"x": places, "legendgroup": arm, "showlegend": row == 1}
+            look = {"x": places, "legendgroup": arm.name, "showlegend": row == 1}
             if any(math.isfinite(r.published) for r in chosen):
-                hatched = {"color": COLOURS[arm], "pattern": {"shape": "/", "fillmode": "replace", "size": 5}}
-                hatched["line"] = {"color": COLOURS[arm], "width": 1}
+                hatched = {"color": arm.colour, "pattern": {"shape": "/", "fillmode": "replace", "size": 5}}
+                hatched["line"] = {"color": arm.colour, "width": 1}
                 values = [short(r.published) for r in chosen]
-                figure.add_trace(Bar(y=values, name=f"{arm}, published", marker=hatched, **look), row, 1)
+                figure.add_trace(Bar(y=values, name=f"{arm.name}, published", marker=hatched, **look), row, 1)
             if chosen:
                 span = _interval(chosen) | {"thickness": 1.2, "width": 2, "color": "#888888"}
                 values = [short(r.measured) for r in chosen]
                 figure.add_trace(
-                    Bar(y=values, error_y=span, name=f"{arm}, measured", marker={"color": COLOURS[arm]}, **look), row, 1
+                    Bar(y=values, error_y=span, name=f"{arm.name}, measured", marker={"color": arm.colour}, **look),
+                    row,
+                    1,
                 )
     figure.update_traces(hovertemplate="%{x}: %{y:.4g}")
     figure.update_xaxes(type="category", automargin=True)

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
+from ...article import WITH, WITHOUT
 from ...typing import Array
+from ..arms import ARMS, PRINTED
 from ..formats import mathtext
 from ..statistics import Result
 from ..study import Outcome
@@ -21,11 +23,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-ARMS = {"without": "without compensation", "with": "with compensation"}
 COLOURS = {
-    "lqr": {"without": "#56B4E9", "with": "#000000"},  # cyan, black
-    "smc": {"without": "#D55E00", "with": "#000000"},  # red, black
-    "smc-tracking": {"without": "#CC79A7", "with": "#005F45"},  # purple, green (darker, for a print in grey)
+    "lqr": {WITHOUT: "#56B4E9", WITH: "#000000"},  # cyan, black
+    "smc": {WITHOUT: "#D55E00", WITH: "#000000"},  # red, black
+    "smc-tracking": {WITHOUT: "#CC79A7", WITH: "#005F45"},  # purple, green (darker, for a print in grey)
 }
 """Of each published controller's arms, by the article's captions."""
 TITLES = {"lqr": "LQR", "smc": "SMC", "smc-tracking": "SMC tracking"}
@@ -41,7 +42,7 @@ _BAR_KINDS = ("published", "measured")
 
 def columns_by(key: Literal["name", "arm"], outcomes: Sequence[Outcome]) -> dict[str, list[Outcome]]:
     """The outcomes of each column by its title, in the article's order."""
-    titles = TITLES if key == "name" else ARMS
+    titles = TITLES if key == "name" else {arm: ARMS[arm].title for arm in PRINTED}
     found = {title: [o for o in outcomes if getattr(o.group, key) == value] for value, title in titles.items()}
     return {title: chosen for title, chosen in found.items() if chosen}
 
@@ -53,7 +54,7 @@ def states(columns: Columns) -> Figure:
         for j, panel in enumerate(column):
             for outcome in chosen:
                 traces = traced(outcome)
-                _lines(panel, outcome, traces.x[:, j], label=title != ARMS[outcome.group.arm])
+                _lines(panel, outcome, traces.x[:, j], label=title != ARMS[outcome.group.arm].title)
             if traces.x_d is not None:
                 panel.plot(traces.time, traces.x_d[:, j], color="black", linewidth=1.2, label="reference")
     for panel, (state, unit) in zip(axes[:, 0], _POSITIONS, strict=True):
@@ -78,7 +79,7 @@ def errors(outcomes: Sequence[Outcome]) -> Figure:
 
 def inputs(columns: Columns) -> Figure:
     """The force without above with compensation: each run's mean, and the range of all."""
-    arms = [arm for arm in ARMS if any(o.group.arm == arm for chosen in columns.values() for o in chosen)]
+    arms = [arm for arm in PRINTED if any(o.group.arm == arm for chosen in columns.values() for o in chosen)]
     figure, axes = _panels(len(arms), len(columns), 1.8 * len(arms), sharex=True, sharey="col")
     for column, chosen in zip(axes.T, columns.values(), strict=True):
         for outcome in chosen:
@@ -89,7 +90,7 @@ def inputs(columns: Columns) -> Figure:
             panel.fill_between(traces.time[some], *span, step="pre", color=_colour(outcome), alpha=0.2, linewidth=0.0)
             _lines(panel, outcome, smooth(traces.time, traces.u_mean), label=False)
     for panel, arm in zip(axes[:, 0], arms, strict=True):
-        panel.set_ylabel(f"$F$ (N)\n{ARMS[arm]}")
+        panel.set_ylabel(f"$F$ (N)\n{ARMS[arm].title}")
     for column in axes.T:
         column[0].plot([], [], color="0.3", linewidth=0.8, label=f"mean over {WINDOW:g} s")
         column[0].fill_between([], [], color="0.3", alpha=0.2, linewidth=0.0, label="range")
@@ -121,7 +122,7 @@ def _bars(panel: Axes, name: str, cells: Sequence[Result]) -> None:
         for r in cells
     ]
     ticks = list(dict.fromkeys(places))
-    bars = [(arm, kind) for arm in ARMS if any(r.cell.compensation == arm for r in cells) for kind in _BAR_KINDS]
+    bars = [(arm, kind) for arm in PRINTED if any(r.cell.compensation == arm for r in cells) for kind in _BAR_KINDS]
     width = 0.84 / len(bars)
     for k, (arm, kind) in enumerate(bars):
         chosen = [(ticks.index(place), r) for place, r in zip(places, cells, strict=True) if r.cell.compensation == arm]
@@ -170,7 +171,7 @@ def _lines(panel: Axes, outcome: Outcome, values: Array, until: float = math.inf
     shown = time <= until
     lines = panel.plot(time[shown], _alive(outcome, values)[shown], color=_colour(outcome), linewidth=0.8, alpha=0.85)
     if label:
-        lines[0].set_label(ARMS[outcome.group.arm])
+        lines[0].set_label(ARMS[outcome.group.arm].title)
 
 
 def _colour(outcome: Outcome) -> str:

@@ -43,10 +43,12 @@ def _plant(scenario: Scenario, outcomes: Sequence[Outcome]) -> Iterable[_Row]:
         )
     )
     printed = asdict(CartPendulum())
+    params = scenario.options["params"].value if "params" in scenario.options else {}
+    given = params if isinstance(params, dict) else printed  # or all, as [M_c, m, l, g]
     for name, value in asdict(plant).items():
         same = value == printed[name]
-        note = f"{_PLANT[name]}; {'Table 2' if same else scenario.environment}"
-        yield _Row(f"plant.{name}", f"{value:g}", "printed" if same else "chosen", note)
+        where = "Table 2" if same else "options.params" if name in given else scenario.environment
+        yield _Row(f"plant.{name}", f"{value:g}", "printed" if same else "chosen", f"{_PLANT[name]}; {where}")
 
 
 def _walk(data: Any, path: tuple[str, ...]) -> Iterable[_Row]:

@@ -11,9 +11,10 @@ import numpy as np
 
 from ...article import Cell
 from .. import formats, metrics, verdicts
+from ..arms import ARMS
 from ..formats import as_csv
 from ..statistics import Result
-from ..study import ARMS, Outcome
+from ..study import Outcome
 
 HEADER = ("", "state", "compensation", "published", "measured", "95 % interval", "median", "ratio", "failed")
 REDUCTION_HEADER = ("", "state", "published %", "measured %", "95 % interval", "median")
