@@ -3,17 +3,16 @@
 import math
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import CONFIGS, ROOT
 
 from smo_gym import LQR, CartPendulum, Gains, SlidingModeController, SlidingModeObserver, theorem
 from smo_gym.evaluation.theorem_on_runs import converge
 from smo_gym.theorem import OperatingSet
 
 SET = OperatingSet(theta=0.7, speed=(1.7, 5.2), speed_hat=(6.0, 6.0), uncertainty=0.2)
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_no_random_point_exceeds_the_suprema_and_some_come_near():
@@ -185,7 +184,7 @@ def test_the_command(tmp_path):
         ("[-0.5, -0.5,", "[0.6, -0.5,", "the set of initial states holds no point"),
         ("settle: {value: 2.0", "settle: {value: 9.0", "settle=9.0 must lie between 0 and horizon=6.0"),
     )
-    settings = (ROOT / "configs" / "theorem.yaml").read_text()
+    settings = (CONFIGS / "theorem.yaml").read_text()
     for old, new, message in changes:
         (tmp_path / "bad.yaml").write_text(settings.replace(old, new))
         options = [*command, "--config", str(tmp_path / "bad.yaml")]

@@ -1,14 +1,13 @@
 """YAML that is more than settings are: one line each, at once; and numbers that look like numbers."""
 
 import time
-from pathlib import Path
 
 import pytest
+from conftest import CONFIGS, ROOT
 
 from smo_gym import files
 from smo_gym.evaluation import scenario, study
 
-ROOT = Path(__file__).resolve().parent.parent
 REGULATION = f"extends: {ROOT}/configs/regulation.yaml\n"
 BOMB = "a0: &a0 [x,x,x,x,x,x,x,x,x,x]\n" + "".join(
     f"a{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)
@@ -99,7 +98,7 @@ def test_scenarios_of_absurd_sizes_are_refused_at_once(tmp_path, text, message):
 
 
 def test_a_copied_scenario_says_where_it_looks_for_the_other_file(tmp_path):
-    text = (ROOT / "configs" / "regulation.yaml").read_text(encoding="utf-8")
+    text = (CONFIGS / "regulation.yaml").read_text(encoding="utf-8")
     assert "extends='article.yaml' is no file: it must be named" in refused(tmp_path / "a.yaml", text, scenario.load)
 
 
@@ -112,7 +111,7 @@ def test_a_chain_of_files_has_an_end(tmp_path):
 
 
 def test_more_runs_than_can_be_done_are_refused_at_once():
-    one = scenario.load(ROOT / "configs" / "regulation.yaml")
+    one = scenario.load(CONFIGS / "regulation.yaml")
     for runs in (10**6, 10**12, 10**400):
         with pytest.raises(ValueError, match=r"runs=.* take fewer runs, levels or initial states"):
             study.groups([one], ["lqr"], study.ARMS, runs)

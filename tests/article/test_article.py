@@ -1,15 +1,12 @@
 """The published data and the printed constants."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from conftest import CONFIGS
 
 from smo_gym import CartPendulum, article
 from smo_gym.article import consistency
 from smo_gym.evaluation import scenario
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 def cells(**where):

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 import yaml
+from conftest import CONFIGS, ROOT
 
 import smo_gym
 from smo_gym import files
 from smo_gym.cli import arguments
 
-ROOT = Path(__file__).resolve().parents[2]
 COMMANDS = sorted(path.stem for path in (ROOT / "agents").glob("[!_]*.py"))
 SET = {"results.csv", "runs.csv", "tables.md", "tables.tex", "settings.yaml"}
 posix = pytest.mark.skipif(os.name != "posix", reason="of POSIX systems")
@@ -38,7 +38,7 @@ def names(folder):
 def short(tmp_path):
     """Arguments of evaluate.py for runs of half a second."""
     changes = {"horizon": {"value": 0.5, "source": "chosen"}}
-    own = {"extends": str(ROOT / "configs" / "initial-conditions.yaml"), **changes}
+    own = {"extends": str(CONFIGS / "initial-conditions.yaml"), **changes}
     (tmp_path / "own.yaml").write_text(yaml.safe_dump(own))
     options = ("--runs", "2", "--controller", "lqr", "--out", str(tmp_path / "out"))
     return ["--config", str(tmp_path / "own.yaml"), *options]
@@ -291,7 +291,7 @@ def test_numbers_are_read_in_one_way():
 def test_messages_show_a_way_out(short, tmp_path, capsys):
     evaluate = load("evaluate")
     own = tmp_path / "own.yaml"
-    own.write_text(own.read_text().replace(str(ROOT / "configs" / "initial-conditions.yaml"), "article.yaml"))
+    own.write_text(own.read_text().replace(str(CONFIGS / "initial-conditions.yaml"), "article.yaml"))
     assert evaluate.main(short) == 2
     message = capsys.readouterr().err
     assert f"{own}: extends='article.yaml' is no file: it must be named as it is found from {tmp_path}/" in message

@@ -4,15 +4,13 @@ import json
 import math
 import os
 import pickle
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
+from conftest import CONFIGS
 
 from smo_gym.learning import measurement, settings, training
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 @pytest.fixture(autouse=True)

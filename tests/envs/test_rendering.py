@@ -6,11 +6,11 @@ import pickle
 import runpy
 import subprocess
 import sys
-from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from conftest import ROOT
 from gymnasium.error import ResetNeeded
 from gymnasium.wrappers import RecordVideo
 from PIL import Image, ImageColor
@@ -19,7 +19,6 @@ import smo_gym
 from smo_gym import ObserverWrapper
 from smo_gym.envs import rendering
 
-ROOT = Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT = rendering.SIZE
 
 

@@ -2,21 +2,20 @@
 
 import runpy
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import CONFIGS, ROOT
 from matplotlib.colors import to_rgb, to_rgba
 
 from smo_gym.evaluation import scenario, statistics, study
 from smo_gym.evaluation.report import figures, panels
 
-ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("regulation", "initial-conditions", "tracking")
 
 
 def load(name, **changes):
-    one = scenario.load(ROOT / "configs" / f"{name}.yaml")
+    one = scenario.load(CONFIGS / f"{name}.yaml")
     changes = {"control_period": 0.01} | changes
     settings = {key: getattr(one, key).model_copy(update={"value": value}) for key, value in changes.items()}
     return one.model_copy(update=settings)

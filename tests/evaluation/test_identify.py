@@ -4,22 +4,21 @@ import json
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import CONFIGS, ROOT
 
 from smo_gym.evaluation import scenario
 from smo_gym.evaluation.identify.search import Hypothesis, Search, cost, profile
 from smo_gym.evaluation.identify.unprinted import Lqr, Regulation, Tracking
 
-ROOT = Path(__file__).resolve().parents[2]
 KNOWN = np.log10([51.8, 57.4, 59.3, 0.284, 12.5, 12.5])
 pytest.importorskip("cma")
 
 
 def config(name):
-    return scenario.load(ROOT / "configs" / f"{name}.yaml")
+    return scenario.load(CONFIGS / f"{name}.yaml")
 
 
 @pytest.fixture(scope="module")

@@ -5,22 +5,21 @@ import json
 import math
 import sys
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import CONFIGS, ROOT
 
 from smo_gym import files
 from smo_gym.evaluation import scenario, statistics, study
 from smo_gym.evaluation.report import page as report
 from smo_gym.evaluation.report import page_traces, tables
 
-ROOT = Path(__file__).resolve().parents[2]
 EVIL = """</script><img src=x onerror="window.hacked = 1">&amp;"""
 
 
 def load(name, **changes):
-    one = scenario.load(ROOT / "configs" / f"{name}.yaml")
+    one = scenario.load(CONFIGS / f"{name}.yaml")
     settings = {
         key: getattr(one, key).model_copy(update={"value": value, "note": EVIL})
         for key, value in ({"control_period": 0.01} | changes).items()

@@ -2,17 +2,15 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from conftest import CONFIGS
 
 from smo_gym import CartPendulum, VectorObserverWrapper
 from smo_gym.evaluation import rollout, scenario, study, verdicts
 from smo_gym.evaluation.statistics import place, results
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 @pytest.fixture(scope="module")

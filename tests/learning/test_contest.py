@@ -3,18 +3,17 @@
 import csv
 import importlib.util
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from conftest import CONFIGS, ROOT
 
 from smo_gym.evaluation import scenario, study
 from smo_gym.learning import bootstrap, contest, contest_table
 from smo_gym.learning.contest import FAILED, Contender, Scores
 from smo_gym.policies.frozen import Card, MlpPolicy
 
-ROOT = Path(__file__).resolve().parents[2]
 spec = importlib.util.spec_from_file_location("compare", ROOT / "agents" / "compare.py")
 compare = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(compare)
@@ -59,7 +58,7 @@ def short(tmp_path):
     changes = {"horizon": 3.0, "uncertainty": [0.1, 0.2], "track_limit": 4.0}
     data = {name: {"value": value, "source": "chosen"} for name, value in changes.items()}
     path = tmp_path / "short.yaml"
-    path.write_text(yaml.safe_dump({"extends": str(ROOT / "configs" / "regulation.yaml"), **data}))
+    path.write_text(yaml.safe_dump({"extends": str(CONFIGS / "regulation.yaml"), **data}))
     return path
 
 

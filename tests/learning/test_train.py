@@ -4,17 +4,15 @@ import importlib.util
 import os
 import pickle
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from conftest import CONFIGS, ROOT
 
 from smo_gym.learning import measurement, settings, training
 from smo_gym.policies import MlpPolicy
 
-ROOT = Path(__file__).resolve().parents[2]
-CONFIGS = ROOT / "configs"
 spec = importlib.util.spec_from_file_location("train", ROOT / "agents" / "train.py")
 train = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(train)

@@ -1,15 +1,13 @@
 """Files of settings in the zoo's shape: what is taken, and what is refused before anything is made."""
 
 import re
-from pathlib import Path
 
 import pytest
 import yaml
+from conftest import CONFIGS
 
 from smo_gym.evaluation import scenario
 from smo_gym.learning import settings
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 @pytest.mark.parametrize(

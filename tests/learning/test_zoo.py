@@ -3,15 +3,13 @@
 import importlib.util
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from conftest import CONFIGS
 
 from smo_gym.policies import sb3_zip
-
-CONFIGS = Path(__file__).resolve().parents[2] / "configs"
 
 
 @pytest.mark.skipif(importlib.util.find_spec("rl_zoo3") is None, reason="needs: pip install rl_zoo3")

@@ -1,10 +1,9 @@
 """The shipped policies do what their cards and the README say."""
 
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
+from conftest import CONFIGS
 
 from smo_gym import CartPendulum, VectorObserverWrapper
 from smo_gym.evaluation import rollout, scenario, study
@@ -12,7 +11,7 @@ from smo_gym.learning.measurement import measure
 from smo_gym.policies import BASELINES, shipped
 from smo_gym.wrappers.view import KINDS
 
-TABLE_4 = scenario.load(Path(__file__).resolve().parents[2] / "configs" / "regulation.yaml")
+TABLE_4 = scenario.load(CONFIGS / "regulation.yaml")
 
 
 @pytest.mark.parametrize("environment", BASELINES)

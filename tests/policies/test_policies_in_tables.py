@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 import yaml
+from conftest import CONFIGS, ROOT
 from stable_baselines3 import PPO, SAC
 
 from smo_gym import SlidingModeObserver
@@ -18,7 +19,6 @@ from smo_gym.evaluation import scenario
 from smo_gym.policies.frozen import Card, MlpPolicy
 from smo_gym.wrappers.view import KINDS, agent_view
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "own-agent.md").read_text(encoding="utf-8")
 spec = importlib.util.spec_from_file_location("evaluate", ROOT / "agents" / "evaluate.py")
 evaluate = importlib.util.module_from_spec(spec)
@@ -64,7 +64,7 @@ def here(tmp_path, monkeypatch):
     monkeypatch.delitem(sys.modules, "twins", raising=False)
     (tmp_path / "twins.py").write_text(TWIN)
     (tmp_path / "leaves.py").write_text("raise SystemExit(3)\n")
-    short = {"extends": str(ROOT / "configs" / "regulation.yaml")}
+    short = {"extends": str(CONFIGS / "regulation.yaml")}
     short |= {"horizon": {"value": 1.0, "source": "chosen"}, "uncertainty": {"value": [0.2], "source": "chosen"}}
     (tmp_path / "short.yaml").write_text(yaml.safe_dump(short))
     return tmp_path
@@ -159,7 +159,7 @@ def test_models_of_stable_baselines3_act_as_their_library_says(here):
 def named_in_a_scenario(here, **changes):
     """A scenario file with controllers whose agents have these names."""
     data = yaml.safe_load((here / "short.yaml").read_text())
-    smc = yaml.safe_load((ROOT / "configs" / "article.yaml").read_text())["controllers"]["smc"]
+    smc = yaml.safe_load((CONFIGS / "article.yaml").read_text())["controllers"]["smc"]
     data["controllers"] = {
         name: {"law": "policy", "agent": agent, "observer": smc["observer"]} for name, agent in changes.items()
     }
@@ -209,7 +209,7 @@ def test_who_cannot_act_somewhere_is_left_out_there(here, capsys):
     linear("a.safetensors")
     assert evaluate.main(["--controller", "a.safetensors", "--scenario", "tracking"]) == 2
     assert "was trained for SMOPendulum-v0, not for SMOPendulumTracking-v0" in capsys.readouterr().err
-    scenarios = [scenario.load(Path("short.yaml")), scenario.load(ROOT / "configs" / "tracking.yaml")]
+    scenarios = [scenario.load(Path("short.yaml")), scenario.load(CONFIGS / "tracking.yaml")]
     more, names, left_out = evaluate.chosen(scenarios, ["a.safetensors", "smc"])
     assert names == ["a.safetensors", "smc"]
     assert ["a.safetensors" in one.controllers for one in more] == [True, False]
@@ -219,7 +219,7 @@ def test_who_cannot_act_somewhere_is_left_out_there(here, capsys):
 
 
 def test_training_and_tables_have_the_same_observer():
-    observer = scenario.load(ROOT / "configs" / "regulation.yaml").controllers["lqr"].observer
+    observer = scenario.load(CONFIGS / "regulation.yaml").controllers["lqr"].observer
     for kind, compensation in (("smo", True), ("smo-uncompensated", False)):
         settings = {name: value for name, value in KINDS[kind].observer.items() if name != "observer"}
         assert SlidingModeObserver(**settings).as_dict() == observer.build(compensation).as_dict()
