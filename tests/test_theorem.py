@@ -1,12 +1,10 @@
 """Theorem 1 as numbers: suprema against random search, times and layers against cases worked out by hand."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
-from conftest import CONFIGS, ROOT
+from conftest import CONFIGS
 
 from smo_gym import LQR, CartPendulum, Gains, SlidingModeController, SlidingModeObserver, theorem
 from smo_gym.evaluation.theorem_on_runs import converge
@@ -170,9 +168,8 @@ def test_margins_are_positive():
         theorem.design(SET, 0.0)
 
 
-def test_the_command(tmp_path):
-    command = [sys.executable, str(ROOT / "agents" / "theorem.py"), "--runs", "30"]
-    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+def test_the_command(command, tmp_path):
+    text = command("theorem", "--runs", "30").stdout
     assert "30 of 30 were inside the layer of both positions by the time of (43)" in text
     assert "30 of 30 kept |e| <= atanh((V + kappa) / m1) / k_p from |e(0)| / kappa on, kappa = 0.5" in text
     assert "In the end |X2 - X2hat| is at most (0.0215, 0.239) m/s, rad/s" in text
@@ -187,7 +184,6 @@ def test_the_command(tmp_path):
     settings = (CONFIGS / "theorem.yaml").read_text()
     for old, new, message in changes:
         (tmp_path / "bad.yaml").write_text(settings.replace(old, new))
-        options = [*command, "--config", str(tmp_path / "bad.yaml")]
-        bad = subprocess.run(options, capture_output=True, text=True, check=False)
+        bad = command("theorem", "--runs", "30", "--config", tmp_path / "bad.yaml", check=False)
         assert bad.returncode == 2
         assert message in bad.stderr

@@ -44,6 +44,7 @@ def both_tables(tmp_path_factory):
     return done.stdout, read(out / "results.csv"), out
 
 
+@pytest.mark.slow
 def test_all_published_cells_are_measured(both_tables):
     text, rows, _ = both_tables
     for controller in ("lqr", "smc"):
@@ -60,6 +61,7 @@ def test_all_published_cells_are_measured(both_tables):
     }
 
 
+@pytest.mark.slow
 def test_columns_begin_with_those_of_the_published_data(both_tables):
     _, rows, _ = both_tables
     published = read(ROOT / "smo_gym" / "article" / "published.csv")
@@ -77,6 +79,7 @@ def test_columns_begin_with_those_of_the_published_data(both_tables):
             assert float(ours[(*place, kind)]) == float(row["value"])
 
 
+@pytest.mark.slow
 def test_lqr_cells_of_table_5_are_within_ten_percent(both_tables):
     _, rows, _ = both_tables
     ratios = [float(row["measured"]) / float(row["published"]) for row in published_cells(rows, "lqr", "5")]
@@ -84,6 +87,7 @@ def test_lqr_cells_of_table_5_are_within_ten_percent(both_tables):
     assert all(abs(ratio - 1) < 0.1 for ratio in ratios)
 
 
+@pytest.mark.slow
 def test_everything_that_was_promised_is_written(both_tables):
     _, _rows, out = both_tables
     assert {path.name for path in out.iterdir()} == {
@@ -204,6 +208,7 @@ def test_the_article_is_checked_against_itself(command):
     assert "133 of 138 printed numbers follow from the printed cells." in command("consistency").stdout
 
 
+@pytest.mark.slow
 def test_the_shipped_reference_is_what_its_command_computes(command, tmp_path):
     pytest.importorskip("casadi")
     options = ["--out", tmp_path / "reference.json"]

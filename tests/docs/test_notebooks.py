@@ -49,6 +49,7 @@ def test_there_are_three():
     assert [path.stem for path in NOTEBOOKS] == ["01-the-article", "02-the-observer", "03-learning"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_runs(path):
     for module in NEEDS.get(path.stem, ()):

@@ -26,10 +26,18 @@ def problem():
     return Lqr(config("initial-conditions"))
 
 
+@pytest.fixture(scope="module")
+def brief():
+    """The same problem over five seconds, for what does not depend on how well it fits."""
+    horizon = scenario.Setting[float](value=5.0, source="chosen")
+    return Lqr(config("initial-conditions").model_copy(update={"horizon": horizon}))
+
+
 def rms(problem, hypothesis):
     return float(cost(problem, KNOWN[None], hypothesis)[0])
 
 
+@pytest.mark.slow
 def test_the_settings_in_configs_fit_and_the_alternatives_do_not(problem):
     ours = rms(problem, Hypothesis())
     assert ours < 0.03
@@ -37,18 +45,20 @@ def test_the_settings_in_configs_fit_and_the_alternatives_do_not(problem):
         assert rms(problem, alternative) > 3 * ours, alternative.name
 
 
-def test_candidates_do_not_disturb_each_other(problem):
+def test_candidates_do_not_disturb_each_other(brief):
     other = KNOWN + 0.1
-    together = cost(problem, np.array([KNOWN, other, KNOWN]), Hypothesis())
-    assert together[0] == together[2] == cost(problem, KNOWN[None], Hypothesis())[0]
+    together = cost(brief, np.array([KNOWN, other, KNOWN]), Hypothesis())
+    assert together[0] == together[2] == cost(brief, KNOWN[None], Hypothesis())[0]
     assert together[1] != together[0]
 
 
+@pytest.mark.slow
 def test_the_profile_rises_away_from_the_optimum(problem):
     around = profile(problem, Hypothesis(), KNOWN, (0.8, 1.25))
     assert (around[:3] > rms(problem, Hypothesis())).all()
 
 
+@pytest.mark.slow
 def test_the_settings_in_configs_fit_tables_4_and_5_under_smc():
     problem = Regulation(config("initial-conditions"), config("regulation"))
     assert len(problem.labels()) == 24
@@ -85,16 +95,16 @@ def test_a_search_begins_where_it_is_told(problem):
 
 
 @pytest.fixture(scope="module")
-def through(problem):
+def through(brief):
     """A search of three generations."""
-    search = Search(problem, Hypothesis(), 0)
+    search = Search(brief, Hypothesis(), 0)
     for _ in range(3):
         search.step()
     return search
 
 
-def test_costs_bring_a_search_back_to_the_bit(problem, through):
-    again = Search(problem, Hypothesis(), 0, costs=json.loads(json.dumps(through.costs[:2])))
+def test_costs_bring_a_search_back_to_the_bit(brief, through):
+    again = Search(brief, Hypothesis(), 0, costs=json.loads(json.dumps(through.costs[:2])))
     again.step()
     assert again.costs == through.costs
     assert np.array_equal(again.best, through.best)
@@ -113,17 +123,18 @@ def test_costs_bring_a_search_back_to_the_bit(problem, through):
         (lambda costs: [[None] * 12], "must be finite"),
     ],
 )
-def test_costs_of_another_search_are_refused(problem, through, change, message):
+def test_costs_of_another_search_are_refused(brief, through, change, message):
     """A cost that was changed, another version of cma, other plants: all would end in a wrong number."""
     with pytest.raises(ValueError, match=message):
-        Search(problem, Hypothesis(), 0, costs=change(through.costs[:2]))
+        Search(brief, Hypothesis(), 0, costs=change(through.costs[:2]))
 
 
 def identify(out, *options):
-    command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--restarts", "1", "--refit", "0"]
-    return [*command, *options, "--out", str(out)]
+    command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--target", "tracking", "--restarts", "1"]
+    return [*command, "--refit", "0", *options, "--out", str(out)]
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
     through = identify(tmp_path / "through", "--generations", "3")
     subprocess.run(through, check=True, capture_output=True)
@@ -150,19 +161,18 @@ def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
     assert "belongs to a run with --generations 3, not --generations 4: choose another --out" in other.stderr
 
 
-def test_bad_arguments_are_named(tmp_path):
-    done = subprocess.run(identify(tmp_path, "--generations", "0"), capture_output=True, text=True, check=False)
+def test_bad_arguments_are_named(command, tmp_path):
+    done = command("identify", "--generations", "0", "--out", tmp_path, check=False)
     assert done.returncode == 2
     assert "--generations: '0' must be a whole number of at least 1" in done.stderr
 
 
-def test_a_state_that_only_unpickling_could_read_is_refused(tmp_path):
+def test_a_state_that_only_unpickling_could_read_is_refused(command, tmp_path):
     (tmp_path / "state.pkl").write_bytes(b"cos\nsystem\n(S'exit 3'\ntR.")
-    command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = command("identify", "--out", tmp_path, check=False)
     assert done.returncode == 2
     assert "state.pkl: is of an older version and is not opened" in done.stderr
     (tmp_path / "state.pkl").unlink()
     (tmp_path / "state.json").write_text('{"plan": 1')
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = command("identify", "--out", tmp_path, check=False)
     assert (done.returncode, "state.json is damaged" in done.stderr) == (2, True)

@@ -232,6 +232,7 @@ def test_a_missing_extra_is_named(monkeypatch, capsys):
     assert 'pip install "smo_gym[rl]"' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_interval_from_five_seeds_covers_95_percent_and_a_plain_percentile_interval_does_not(monkeypatch):
     def coverage(runs=150):
         """How often the interval of a learned policy's ratio to a law holds the true one, 1."""
