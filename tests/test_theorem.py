@@ -168,6 +168,7 @@ def test_margins_are_positive():
         theorem.design(SET, 0.0)
 
 
+@pytest.mark.slow
 def test_the_command(command, tmp_path):
     text = command("theorem", "--runs", "30").stdout
     assert "30 of 30 were inside the layer of both positions by the time of (43)" in text

@@ -136,9 +136,9 @@ def identify(out, *options):
 
 @pytest.mark.slow
 def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
-    through = identify(tmp_path / "through", "--generations", "3")
+    through = identify(tmp_path / "through", "--generations", "2")
     subprocess.run(through, check=True, capture_output=True)
-    stopped = identify(tmp_path / "stopped", "--generations", "3")
+    stopped = identify(tmp_path / "stopped", "--generations", "2")
     process = subprocess.Popen(
         stopped,
         stderr=subprocess.PIPE,
@@ -158,7 +158,7 @@ def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
         identify(tmp_path / "stopped", "--generations", "4"), capture_output=True, text=True, check=False
     )
     assert other.returncode == 2
-    assert "belongs to a run with --generations 3, not --generations 4: choose another --out" in other.stderr
+    assert "belongs to a run with --generations 2, not --generations 4: choose another --out" in other.stderr
 
 
 def test_bad_arguments_are_named(command, tmp_path):

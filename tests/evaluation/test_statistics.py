@@ -62,6 +62,7 @@ def test_failed_runs_are_counted_and_kept_out_of_means(small):
     assert find(nothing, uncertainty_percent="10", metric="mse", state="h").failures == 2
 
 
+@pytest.mark.slow
 def test_intervals_of_ten_runs_hold_the_mean_as_often_as_they_say(small):
     rng = np.random.default_rng(0)
     held = 0
