@@ -1,12 +1,20 @@
 """Shared helpers."""
 
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
 import gymnasium
 import numpy as np
 import pytest
 
 import smo_gym  # noqa: F401  registers the environments
+from smo_gym.evaluation import scenario
 from smo_gym.evaluation.arms import ARMS
 
+ROOT = Path(__file__).resolve().parents[1]
+CONFIGS = ROOT / "configs"
+SMALL = ROOT / "tests" / "evaluation" / "small.yaml"
 IDS = ("SMOPendulum-v0", "SMOPendulumUpright-v0", "SMOPendulumTracking-v0")
 
 
@@ -25,6 +33,22 @@ def registry():
 
 
 @pytest.fixture
+def command(capsys, monkeypatch):
+    """Runs a command in this process: what it answers, prints and complains of."""
+
+    def run(name, *arguments, cwd=None, check=True):
+        if cwd:
+            monkeypatch.chdir(cwd)
+        capsys.readouterr()
+        code = runpy.run_path(str(ROOT / "agents" / f"{name}.py"))["main"]([*map(str, arguments)])
+        shown = capsys.readouterr()
+        assert not check or code == 0, shown.err
+        return SimpleNamespace(returncode=code, stdout=shown.out, stderr=shown.err)
+
+    return run
+
+
+@pytest.fixture
 def make_vec():
     """A native vector environment."""
 
@@ -32,6 +56,12 @@ def make_vec():
         return gymnasium.make_vec(id, n, vectorization_mode="vector_entry_point", **options)
 
     return make
+
+
+@pytest.fixture
+def small():
+    """The smallest scenario."""
+    return scenario.load(SMALL)
 
 
 def assert_same(a, b, path="info"):

@@ -3,9 +3,9 @@
 import ast
 import re
 from graphlib import TopologicalSorter
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+from conftest import ROOT
+
 ROOMS = re.findall(
     r"`(?:smo_gym/)?(\w+)(?:\.py|/)`", (ROOT / "README.md").read_text(encoding="utf-8").split("## Where things are")[1]
 )

@@ -1,9 +1,6 @@
 """Theorem 1 as numbers: suprema against random search, times and layers against cases worked out by hand."""
 
 import math
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +11,6 @@ from smo_gym.evaluation.theorem_on_runs import converge
 from smo_gym.theorem import OperatingSet
 
 SET = OperatingSet(theta=0.7, speed=(1.7, 5.2), speed_hat=(6.0, 6.0), uncertainty=0.2)
-ROOT = Path(__file__).resolve().parent.parent
 
 
 def test_no_random_point_exceeds_the_suprema_and_some_come_near():
@@ -172,9 +168,9 @@ def test_margins_are_positive():
         theorem.design(SET, 0.0)
 
 
-def test_the_command(tmp_path):
-    command = [sys.executable, str(ROOT / "agents" / "theorem.py"), "--runs", "30"]
-    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+@pytest.mark.slow
+def test_the_command(command, tmp_path):
+    text = command("theorem", "--runs", "30").stdout
     assert "30 of 30 were inside the layer of both positions by the time of (43)" in text
     assert "30 of 30 kept |e| <= atanh((V + kappa) / m1) / k_p from |e(0)| / kappa on, kappa = 0.5" in text
     assert "In the end |X2 - X2hat| is at most (0.0215, 0.239) m/s, rad/s" in text
@@ -189,7 +185,6 @@ def test_the_command(tmp_path):
     settings = configs.path("theorem").read_text()
     for old, new, message in changes:
         (tmp_path / "bad.yaml").write_text(settings.replace(old, new))
-        options = [*command, "--config", str(tmp_path / "bad.yaml")]
-        bad = subprocess.run(options, capture_output=True, text=True, check=False)
+        bad = command("theorem", "--runs", "30", "--config", tmp_path / "bad.yaml", check=False)
         assert bad.returncode == 2
         assert message in bad.stderr

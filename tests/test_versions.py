@@ -3,14 +3,13 @@
 import re
 import tomllib
 from importlib import metadata
-from pathlib import Path
 
 import yaml
+from conftest import ROOT
 
 import smo_gym
 from smo_gym.cli.arguments import versions
 
-ROOT = Path(__file__).resolve().parent.parent
 EXTRAS = ("rl", "render", "plots", "report", "reference")
 
 

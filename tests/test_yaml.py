@@ -1,14 +1,12 @@
 """YAML that is more than settings are: one line each, at once; and numbers that look like numbers."""
 
 import time
-from pathlib import Path
 
 import pytest
 
 from smo_gym import files
 from smo_gym.evaluation import arms, configs, scenario, study
 
-ROOT = Path(__file__).resolve().parent.parent
 REGULATION = "extends: regulation\n"
 BOMB = "a0: &a0 [x,x,x,x,x,x,x,x,x,x]\n" + "".join(
     f"a{i}: &a{i} [{','.join([f'*a{i - 1}'] * 10)}]\n" for i in range(1, 10)

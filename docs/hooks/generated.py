@@ -62,6 +62,11 @@ def readme(*words: str) -> str:
     return table[0]
 
 
+def contributing() -> str:
+    """What stands in the repository for those who contribute, its links as they are from here."""
+    return (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8").replace("](docs/", "](")
+
+
 def settings() -> str:
     """Every setting of ``configs/`` that has a source, file by file."""
     parts = []
@@ -140,6 +145,7 @@ def _shown(value: Any) -> str:
 
 GENERATORS: dict[str, Callable[..., str]] = {
     "commands": commands,
+    "contributing": contributing,
     "environment": environment,
     "modules": modules,
     "output": output,

@@ -5,20 +5,20 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
+from functools import partial
 
 import pytest
 import yaml
+from conftest import ROOT
 
 from smo_gym.evaluation import configs
 
-ROOT = Path(__file__).resolve().parents[2]
 EVALUATE = ROOT / "agents" / "evaluate.py"
 
 
-def evaluate(*arguments, cwd=None, check=True):
-    command = [sys.executable, str(EVALUATE), *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, check=check, capture_output=True, text=True)
+@pytest.fixture
+def evaluate(command):
+    return partial(command, "evaluate")
 
 
 def read(path):
@@ -41,10 +41,12 @@ def published_cells(rows, controller, table):
 def both_tables(tmp_path_factory):
     """All tables for both controllers with the default 10 runs."""
     out = tmp_path_factory.mktemp("both")
-    done = evaluate("--controller", "all", "--scenario", "all", "--out", out)
+    options = ["--controller", "all", "--scenario", "all", "--out", str(out)]
+    done = subprocess.run([sys.executable, str(EVALUATE), *options], check=True, capture_output=True, text=True)
     return done.stdout, read(out / "results.csv"), out
 
 
+@pytest.mark.slow
 def test_all_published_cells_are_measured(both_tables):
     text, rows, _ = both_tables
     for controller in ("lqr", "smc"):
@@ -61,6 +63,7 @@ def test_all_published_cells_are_measured(both_tables):
     }
 
 
+@pytest.mark.slow
 def test_columns_begin_with_those_of_the_published_data(both_tables):
     _, rows, _ = both_tables
     published = read(ROOT / "smo_gym" / "article" / "published.csv")
@@ -78,6 +81,7 @@ def test_columns_begin_with_those_of_the_published_data(both_tables):
             assert float(ours[(*place, kind)]) == float(row["value"])
 
 
+@pytest.mark.slow
 def test_lqr_cells_of_table_5_are_within_ten_percent(both_tables):
     _, rows, _ = both_tables
     ratios = [float(row["measured"]) / float(row["published"]) for row in published_cells(rows, "lqr", "5")]
@@ -85,6 +89,7 @@ def test_lqr_cells_of_table_5_are_within_ten_percent(both_tables):
     assert all(abs(ratio - 1) < 0.1 for ratio in ratios)
 
 
+@pytest.mark.slow
 def test_everything_that_was_promised_is_written(both_tables):
     _, _rows, out = both_tables
     assert {path.name for path in out.iterdir()} == {
@@ -109,8 +114,9 @@ def test_everything_that_was_promised_is_written(both_tables):
     assert not any(int(run["failed"]) for run in runs)
 
 
-def test_one_seed_gives_one_result(tmp_path):
-    arguments = ("--controller", "smc", "--scenario", "initial-conditions", "--runs", "2", "--seed", "5")
+def test_one_seed_gives_one_result(evaluate, tmp_path):
+    config = small_scenario(tmp_path, horizon={"value": 1.0, "source": "chosen"})
+    arguments = ("--controller", "smc", "--config", config, "--runs", "2", "--seed", "5")
     for name in ("a", "b"):
         evaluate(*arguments, "--out", tmp_path / name)
     assert (tmp_path / "a" / "results.csv").read_bytes() == (tmp_path / "b" / "results.csv").read_bytes()
@@ -126,7 +132,7 @@ def small_scenario(tmp_path, **changes):
     return path
 
 
-def test_options_choose_arms_levels_and_files(tmp_path):
+def test_options_choose_arms_levels_and_files(evaluate, tmp_path):
     config = small_scenario(tmp_path, horizon={"value": 0.5, "source": "chosen"})
     options = ("--uncertainty", "20%", "0.1", "--runs", "3", "--controller", "lqr")
     done = evaluate("--config", config, *options, "--observer", "oracle", "--out", tmp_path / "new" / "deep")
@@ -145,13 +151,13 @@ def test_options_choose_arms_levels_and_files(tmp_path):
         (("--scenario", "tracking", "--config", "own.yaml"), "give one of them"),
     ],
 )
-def test_options_that_contradict_each_other_are_named(tmp_path, options, message):
+def test_options_that_contradict_each_other_are_named(evaluate, tmp_path, options, message):
     done = evaluate(*options, check=False, cwd=tmp_path)
     assert done.returncode == 2
     assert message in done.stderr
 
 
-def test_failed_runs_are_shown(tmp_path):
+def test_failed_runs_are_shown(evaluate, tmp_path):
     config = small_scenario(
         tmp_path, horizon={"value": 3.0, "source": "chosen"}, track_limit={"value": 0.9, "source": "chosen"}
     )
@@ -165,7 +171,7 @@ def test_failed_runs_are_shown(tmp_path):
     assert "16 of 32 runs failed" in done.stdout
 
 
-def test_the_theorems_gains_are_an_arm_of_their_own(tmp_path):
+def test_the_theorems_gains_are_an_arm_of_their_own(evaluate, tmp_path):
     config = small_scenario(tmp_path, horizon={"value": 2.0, "source": "chosen"})
     options = ("--config", config, "--controller", "lqr", "--runs", "2", "--compensation", "on")
     evaluate(*options, "--observer", "all", "--out", tmp_path / "out")
@@ -188,34 +194,32 @@ def test_the_theorems_gains_are_an_arm_of_their_own(tmp_path):
     assert "has no setting 'designed'" in done.stderr
 
 
-def test_falls_of_the_upright_plant_are_counted(tmp_path):
+def test_falls_of_the_upright_plant_are_counted(command, tmp_path):
     config = yaml.safe_load(configs.path("upright").read_text())
     config["horizon"]["value"] = 3.0
     config["uncertainty"]["value"] = [0.2]
     config["initial_states"]["value"] = {"near": [0.0, 0.05, 0.0, 0.0], "far": [0.0, 1.2, 0.0, 0.0]}
     (tmp_path / "upright.yaml").write_text(yaml.safe_dump(config))
-    command = [sys.executable, str(ROOT / "agents" / "upright.py"), "--config", str(tmp_path / "upright.yaml")]
-    lines = subprocess.run([*command, "--runs", "20"], check=True, capture_output=True, text=True).stdout.splitlines()
+    lines = command("upright", "--config", tmp_path / "upright.yaml", "--runs", "20").stdout.splitlines()
     near, far = (next(line for line in lines if line.startswith(case)) for case in ("near", "far"))
     assert near.count("0.0 [0.0, 16.1]") == 4
     assert far.count("100.0 [83.9, 100.0]") >= 2
 
 
-def test_the_article_is_checked_against_itself():
-    command = [sys.executable, str(ROOT / "agents" / "consistency.py")]
-    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    assert "133 of 138 printed numbers follow from the printed cells." in text
+def test_the_article_is_checked_against_itself(command):
+    assert "133 of 138 printed numbers follow from the printed cells." in command("consistency").stdout
 
 
-def test_the_shipped_reference_is_what_its_command_computes(tmp_path):
+@pytest.mark.slow
+def test_the_shipped_reference_is_what_its_command_computes(command, tmp_path):
     pytest.importorskip("casadi")
-    command = [sys.executable, str(ROOT / "agents" / "reference.py"), "--out", str(tmp_path / "reference.json")]
-    subprocess.run(command, check=True, capture_output=True)
+    options = ["--out", tmp_path / "reference.json"]
+    command("reference", *options)
     ours = json.loads((ROOT / "smo_gym" / "article" / "reference.json").read_text())
     again = json.loads((tmp_path / "reference.json").read_text())
     assert again["cost"] == pytest.approx(ours["cost"], rel=1e-9)
     assert again["u"] == pytest.approx(ours["u"], abs=1e-5)
-    bad = subprocess.run([*command, "--horizon", "0.2"], check=False, capture_output=True, text=True)
+    bad = command("reference", *options, "--horizon", "0.2", check=False)
     assert bad.returncode == 2
     assert "IPOPT says" in bad.stderr
 
@@ -233,7 +237,7 @@ def test_the_shipped_reference_is_what_its_command_computes(tmp_path):
         (["--run", "3"], "unrecognized arguments: --run"),
     ],
 )
-def test_bad_arguments_are_named_before_any_work(tmp_path, arguments, message):
+def test_bad_arguments_are_named_before_any_work(evaluate, tmp_path, arguments, message):
     done = evaluate(*arguments, "--out", tmp_path / "out", cwd=tmp_path, check=False)
     assert done.returncode == 2
     assert message in done.stderr
@@ -241,14 +245,14 @@ def test_bad_arguments_are_named_before_any_work(tmp_path, arguments, message):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_config_typo_is_named(tmp_path):
+def test_a_config_typo_is_named(evaluate, tmp_path):
     path = small_scenario(tmp_path, horizn={"value": 1.0, "source": "chosen"})
     done = evaluate("--config", path, check=False, cwd=tmp_path)
     assert done.returncode == 2
     assert "did you mean 'horizon'?" in done.stderr
 
 
-def test_an_unwritable_folder_is_noticed_before_the_work(tmp_path):
+def test_an_unwritable_folder_is_noticed_before_the_work(evaluate, tmp_path):
     (tmp_path / "file").write_text("")
     done = evaluate("--out", tmp_path / "file" / "out", "--runs", "100000", check=False)
     assert done.returncode == 2

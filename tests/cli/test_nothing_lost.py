@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 import yaml
+from conftest import ROOT
 
 import smo_gym
 from smo_gym import files
 from smo_gym.cli import arguments
 from smo_gym.cli.commands import COMMANDS
 
-ROOT = Path(__file__).resolve().parents[2]
 SET = {"results.csv", "runs.csv", "tables.md", "tables.tex", "settings.yaml"}
 posix = pytest.mark.skipif(os.name != "posix", reason="of POSIX systems")
 
@@ -47,6 +47,7 @@ def shell(redirection, command, *options, **environment):
     return subprocess.run(program, check=False, capture_output=True, text=True, env=os.environ | environment)
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize(
     ("redirection", "code"),
@@ -260,31 +261,6 @@ def test_every_command_says_its_versions(command, capsys):
     shown = capsys.readouterr().out
     for name in ("python", *arguments.PACKAGES):
         assert f"{name} " in shown
-
-
-def test_numbers_are_read_in_one_way():
-    assert [arguments.whole(0)(text) for text in ("1e6", "12", "1.5e1", "9007199254740993")] == [
-        1_000_000,
-        12,
-        15,
-        9007199254740993,
-    ]
-    assert [arguments.real(text) for text in ("3e-4", "-1e-3", ".5")] == [3e-4, -1e-3, 0.5]
-    assert [arguments.fraction(text) for text in ("5%", "5e-2", "0")] == [0.05, 0.05, 0.0]
-    for kind, texts in (
-        (arguments.whole(0), ("-1", "1.5", "nan", "1e999999999", "x", "")),
-        (arguments.real, ("nan", "inf", "1e999", "x")),
-        (arguments.positive("newtons"), ("0", "-1", "inf", "x")),
-        (arguments.fraction, ("1", "5", "-0.1", "100%", "nan")),
-    ):
-        for text in texts:
-            with pytest.raises(arguments.argparse.ArgumentTypeError, match=f"'{text}' must be a"):
-                kind(text)
-    parser = arguments.Parser("", "")
-    parser.add_argument("--start", type=arguments.real, nargs=2)
-    assert parser.parse_args(["--start", "-1e-3", "2"]).start == [-1e-3, 2.0]
-    command = load("evaluate").parse(["--controller", "lqr,smc", "--scenario", "regulation,tracking", "--runs", "1e1"])
-    assert (command.controller, command.scenario, command.runs) == (["lqr", "smc"], ["regulation", "tracking"], 10)
 
 
 def test_messages_show_a_way_out(short, tmp_path, capsys):

@@ -11,8 +11,8 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 EXECUTED = sorted(path.relative_to(DOCS).as_posix() for path in (DOCS / "tutorial.md", *DOCS.glob("how-to/*.md")))
 OFFLINE = {"NO_MKDOCS_2_WARNING": "1", "http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
@@ -120,6 +120,7 @@ def pages(site):
     return {path.relative_to(site).as_posix(): path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
 
 
+@pytest.mark.slow
 def test_site_loads_nothing_from_elsewhere_and_names_no_folder_of_the_machine(site):
     for page, text in pages(site).items():
         assert not re.search(r"<(?:script|link|img|iframe)[^>]*(?:src|href)=\"?(?:https?:)?//", text), page
@@ -127,11 +128,13 @@ def test_site_loads_nothing_from_elsewhere_and_names_no_folder_of_the_machine(si
             assert str(folder) not in text, page
 
 
+@pytest.mark.slow
 def test_external_links_are_few(site):
     found = {link for text in pages(site).values() for link in re.findall(r'href="(https?://[^"]+)"', text)}
     assert found == EXTERNAL
 
 
+@pytest.mark.slow
 def test_formulas_are_rendered(site):
     text = pages(site)["mathematics.html"]
     assert text.count("<math ") == MATHEMATICS.count("$$") // 2 + len(re.findall(r"\\\(", MATHEMATICS))
@@ -140,6 +143,7 @@ def test_formulas_are_rendered(site):
         assert f'id="eq-{number}"' in text
 
 
+@pytest.mark.slow
 def test_generated_pages_say_what_the_code_does(site):
     built = pages(site)
     for command in ROOT.glob("agents/*.py"):
@@ -154,6 +158,7 @@ def test_generated_pages_say_what_the_code_does(site):
     assert "133 of 138 printed numbers" in built["reproduction.html"]
 
 
+@pytest.mark.slow
 def test_every_module_is_in_the_reference(site):
     reference = "".join(text for page, text in pages(site).items() if page.startswith("api/"))
     for path in (ROOT / "smo_gym").rglob("[!_]*.py"):

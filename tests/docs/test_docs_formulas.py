@@ -1,17 +1,17 @@
 """The formulas of the mathematics page, read from their TeX, are those that the code computes."""
 
 import re
-from pathlib import Path
 
 import pytest
 import sympy
+from conftest import ROOT
 from sympy.parsing.sympy_parser import implicit_multiplication, parse_expr, standard_transformations
 
 from smo_gym import CartPendulum
 from smo_gym.kernels import plain
 from smo_gym.kernels.cart_pendulum import control_affine, energy
 
-PAGE = (Path(__file__).resolve().parents[2] / "docs" / "mathematics.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "mathematics.md").read_text(encoding="utf-8")
 FORMULAS = re.findall(r"^\$\$ (.*?) \$\$$", PAGE, re.MULTILINE)
 M, m, l, g, F, t, v, w = SYMBOLS = sympy.symbols("M m l g F t v w", real=True)
 sigma = sympy.Symbol("sigma")

@@ -1,11 +1,11 @@
 """The README's Python examples run as they stand."""
 
 import re
-from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+README = ROOT / "README.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
 
 

@@ -5,7 +5,6 @@ import os
 import pickle
 import subprocess
 import sys
-from pathlib import Path
 
 import gymnasium
 import numpy as np
@@ -19,7 +18,6 @@ from smo_gym import ObserverWrapper
 from smo_gym.cli import animate
 from smo_gym.envs import rendering
 
-ROOT = Path(__file__).resolve().parents[2]
 WIDTH, HEIGHT = rendering.SIZE
 
 

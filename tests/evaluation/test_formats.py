@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 import yaml
-from test_evaluation import SCENARIO
+from conftest import SMALL
 from test_report import Page
 
 from smo_gym.evaluation import formats, scenario, statistics, study
@@ -32,7 +32,7 @@ NAMES = [
 @pytest.fixture(scope="module")
 def measured(tmp_path_factory):
     """Outcomes of one scenario whose table, controller and cases have such names."""
-    data = yaml.safe_load(SCENARIO)
+    data = yaml.safe_load(SMALL.read_text())
     data["horizon"]["value"] = 0.05
     data["initial_states"]["value"] = {name: [1.0, 1.0, 0.1, 0.01] for name in NAMES[:-1]}
     path = tmp_path_factory.mktemp("names") / "names.yaml"

@@ -4,16 +4,15 @@ import json
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 from smo_gym.evaluation import scenario
 from smo_gym.evaluation.identify.search import Hypothesis, Search, cost, profile
 from smo_gym.evaluation.identify.unprinted import Lqr, Regulation, Tracking
 
-ROOT = Path(__file__).resolve().parents[2]
 KNOWN = np.log10([51.8, 57.4, 59.3, 0.284, 12.5, 12.5])
 pytest.importorskip("cma")
 
@@ -23,10 +22,17 @@ def problem():
     return Lqr(scenario.named("initial-conditions"))
 
 
+@pytest.fixture(scope="module")
+def brief():
+    """The same problem over five seconds, for what does not depend on how well it fits."""
+    return Lqr(scenario.named("initial-conditions").changed(horizon=5.0))
+
+
 def rms(problem, hypothesis):
     return float(cost(problem, KNOWN[None], hypothesis)[0])
 
 
+@pytest.mark.slow
 def test_the_settings_in_configs_fit_and_the_alternatives_do_not(problem):
     ours = rms(problem, Hypothesis())
     assert ours < 0.03
@@ -34,18 +40,20 @@ def test_the_settings_in_configs_fit_and_the_alternatives_do_not(problem):
         assert rms(problem, alternative) > 3 * ours, alternative.name
 
 
-def test_candidates_do_not_disturb_each_other(problem):
+def test_candidates_do_not_disturb_each_other(brief):
     other = KNOWN + 0.1
-    together = cost(problem, np.array([KNOWN, other, KNOWN]), Hypothesis())
-    assert together[0] == together[2] == cost(problem, KNOWN[None], Hypothesis())[0]
+    together = cost(brief, np.array([KNOWN, other, KNOWN]), Hypothesis())
+    assert together[0] == together[2] == cost(brief, KNOWN[None], Hypothesis())[0]
     assert together[1] != together[0]
 
 
+@pytest.mark.slow
 def test_the_profile_rises_away_from_the_optimum(problem):
     around = profile(problem, Hypothesis(), KNOWN, (0.8, 1.25))
     assert (around[:3] > rms(problem, Hypothesis())).all()
 
 
+@pytest.mark.slow
 def test_the_settings_in_configs_fit_tables_4_and_5_under_smc():
     problem = Regulation(scenario.named("initial-conditions"), scenario.named("regulation"))
     assert len(problem.labels()) == 24
@@ -81,16 +89,16 @@ def test_a_search_begins_where_it_is_told(problem):
 
 
 @pytest.fixture(scope="module")
-def through(problem):
+def through(brief):
     """A search of three generations."""
-    search = Search(problem, Hypothesis(), 0)
+    search = Search(brief, Hypothesis(), 0)
     for _ in range(3):
         search.step()
     return search
 
 
-def test_costs_bring_a_search_back_to_the_bit(problem, through):
-    again = Search(problem, Hypothesis(), 0, costs=json.loads(json.dumps(through.costs[:2])))
+def test_costs_bring_a_search_back_to_the_bit(brief, through):
+    again = Search(brief, Hypothesis(), 0, costs=json.loads(json.dumps(through.costs[:2])))
     again.step()
     assert again.costs == through.costs
     assert np.array_equal(again.best, through.best)
@@ -109,21 +117,22 @@ def test_costs_bring_a_search_back_to_the_bit(problem, through):
         (lambda costs: [[None] * 12], "must be finite"),
     ],
 )
-def test_costs_of_another_search_are_refused(problem, through, change, message):
+def test_costs_of_another_search_are_refused(brief, through, change, message):
     """A cost that was changed, another version of cma, other plants: all would end in a wrong number."""
     with pytest.raises(ValueError, match=message):
-        Search(problem, Hypothesis(), 0, costs=change(through.costs[:2]))
+        Search(brief, Hypothesis(), 0, costs=change(through.costs[:2]))
 
 
 def identify(out, *options):
-    command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--restarts", "1", "--refit", "0"]
-    return [*command, *options, "--out", str(out)]
+    command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--target", "tracking", "--restarts", "1"]
+    return [*command, "--refit", "0", *options, "--out", str(out)]
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
-    through = identify(tmp_path / "through", "--generations", "3")
+    through = identify(tmp_path / "through", "--generations", "2")
     subprocess.run(through, check=True, capture_output=True)
-    stopped = identify(tmp_path / "stopped", "--generations", "3")
+    stopped = identify(tmp_path / "stopped", "--generations", "2")
     process = subprocess.Popen(
         stopped,
         stderr=subprocess.PIPE,
@@ -143,22 +152,21 @@ def test_an_interrupted_search_resumes_to_the_same_result(tmp_path):
         identify(tmp_path / "stopped", "--generations", "4"), capture_output=True, text=True, check=False
     )
     assert other.returncode == 2
-    assert "belongs to a run with --generations 3, not --generations 4: choose another --out" in other.stderr
+    assert "belongs to a run with --generations 2, not --generations 4: choose another --out" in other.stderr
 
 
-def test_bad_arguments_are_named(tmp_path):
-    done = subprocess.run(identify(tmp_path, "--generations", "0"), capture_output=True, text=True, check=False)
+def test_bad_arguments_are_named(command, tmp_path):
+    done = command("identify", "--generations", "0", "--out", tmp_path, check=False)
     assert done.returncode == 2
     assert "--generations: '0' must be a whole number of at least 1" in done.stderr
 
 
-def test_a_state_that_only_unpickling_could_read_is_refused(tmp_path):
+def test_a_state_that_only_unpickling_could_read_is_refused(command, tmp_path):
     (tmp_path / "state.pkl").write_bytes(b"cos\nsystem\n(S'exit 3'\ntR.")
-    command = [sys.executable, str(ROOT / "agents" / "identify.py"), "--out", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = command("identify", "--out", tmp_path, check=False)
     assert done.returncode == 2
     assert "state.pkl: is of an older version and is not opened" in done.stderr
     (tmp_path / "state.pkl").unlink()
     (tmp_path / "state.json").write_text('{"plan": 1')
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = command("identify", "--out", tmp_path, check=False)
     assert (done.returncode, "state.json is damaged" in done.stderr) == (2, True)

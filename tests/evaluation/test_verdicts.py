@@ -53,6 +53,7 @@ def runs(one, name, start, plants, xhat0=None):
     return rollout(VectorObserverWrapper(env, observer), one.agent(name), options=options)
 
 
+@pytest.mark.slow
 def test_falls_from_far_come_from_the_start_of_the_estimate():
     one = scenario.named("upright")
     rng = np.random.default_rng(0)
@@ -62,6 +63,7 @@ def test_falls_from_far_come_from_the_start_of_the_estimate():
     assert runs(one, "lqr", start, plants, xhat0=tuple(start)).failed.sum() == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "least"), [("regulation", 0.01), ("tracking", 0.03)])
 def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
     one = scenario.named(name)
@@ -76,6 +78,7 @@ def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
     assert all(abs(b[m].mean() / a[m].mean() - 1.0) < 0.04 for m in ("mse_h", "mse_theta"))
 
 
+@pytest.mark.slow
 def test_table_7_scatters_more_than_ten_runs_explain():
     one = scenario.named("tracking")
     outcomes = study.measure(study.groups([one], ["smc"], ["without", "with"], 200), 0)

@@ -8,10 +8,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 
 import smo_gym
 
-_ROOT = str(Path(smo_gym.__file__).parent.parent)
+pytestmark = pytest.mark.slow
 _PROBE = """
 import numpy as np
 from smo_gym.plant import CartPendulum, advance
@@ -28,8 +29,23 @@ def _probe(cwd, **environment):
     return subprocess.run(command, cwd=cwd, check=True, capture_output=True, text=True, env=kept | environment)
 
 
+def _package(folder):
+    """A copy of the package, without what was compiled."""
+    shutil.copytree(Path(smo_gym.__file__).parent, folder / "smo_gym", ignore=shutil.ignore_patterns("__pycache__"))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A package, its cache in a folder beside it, and what a probe that filled the cache printed."""
+    folder = _package(tmp_path_factory.mktemp("whole"))
+    done = _probe(folder, NUMBA_CACHE_DIR=str(folder / "cache"))
+    assert done.stderr == ""
+    return folder, folder / "cache", done.stdout
+
+
 def test_a_change_of_the_equations_is_never_hidden_by_the_cache(tmp_path):
-    shutil.copytree(Path(smo_gym.__file__).parent, tmp_path / "smo_gym", ignore=shutil.ignore_patterns("__pycache__"))
+    _package(tmp_path)
 
     def run():
         return _probe(tmp_path).stdout
@@ -44,45 +60,37 @@ def test_a_change_of_the_equations_is_never_hidden_by_the_cache(tmp_path):
     assert run() != before
 
 
-def _package(folder):
-    """A copy of the package, with a cache of its own."""
-    shutil.copytree(Path(smo_gym.__file__).parent, folder / "smo_gym", ignore=shutil.ignore_patterns("__pycache__"))
-    return folder
-
-
 @pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: b"\0" * 99])
 @pytest.mark.parametrize("kind", ["nbi", "nbc"])
-def test_a_damaged_cache_is_said_once_and_mended(tmp_path, damage, kind):
-    folder, cache = _package(tmp_path), tmp_path / "cache"
-    place = {"NUMBA_CACHE_DIR": str(cache)}
-    whole = _probe(folder, **place)
-    assert whole.stderr == ""
-    files = list(cache.rglob(f"*.{kind}"))
+def test_a_damaged_cache_is_said_once_and_mended(whole, tmp_path, damage, kind):
+    folder, cache, printed = whole
+    place = {"NUMBA_CACHE_DIR": str(shutil.copytree(cache, tmp_path / "cache"))}
+    files = list(tmp_path.rglob(f"*.{kind}"))
     assert files
     for file in files:
         file.write_bytes(damage(file.read_bytes()))
     damaged = _probe(folder, **place)
-    assert damaged.stdout == whole.stdout
+    assert damaged.stdout == printed
     assert damaged.stderr.count("compiled kernels cannot be cached or read back") == 1
     again = _probe(folder, **place)
-    assert (again.stdout, again.stderr) == (whole.stdout, "")
+    assert (again.stdout, again.stderr) == (printed, "")
 
 
-def test_a_cache_that_cannot_be_written_is_no_failure(tmp_path):
-    folder = _package(tmp_path)
+def test_a_cache_that_cannot_be_written_is_no_failure(whole, tmp_path):
+    folder, _, printed = whole
     (tmp_path / "file").write_text("")
     done = _probe(folder, NUMBA_CACHE_DIR=str(tmp_path / "file" / "cache"))
-    assert done.stdout == _probe(folder, NUMBA_CACHE_DIR=str(tmp_path / "cache")).stdout
+    assert done.stdout == printed
     assert done.stderr.count("compiled kernels cannot be cached") <= 1  # none where Numba finds another folder
 
 
-def test_without_a_compiler_the_bits_are_the_same(tmp_path):
-    assert _probe(tmp_path, NUMBA_DISABLE_JIT="1", PYTHONPATH=_ROOT).stdout == _probe(tmp_path, PYTHONPATH=_ROOT).stdout
+def test_without_a_compiler_the_bits_are_the_same(whole, tmp_path):
+    assert _probe(tmp_path, NUMBA_DISABLE_JIT="1", PYTHONPATH=str(ROOT)).stdout == whole[2]
 
 
-def test_a_processor_without_fma_is_named(tmp_path):
-    place = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": _ROOT}
+def test_a_processor_without_fma_is_named(whole, tmp_path):
+    place = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     done = _probe(tmp_path, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="", **place)
-    assert done.stdout == _probe(tmp_path, **place).stdout
+    assert done.stdout == whole[2]
     if platform.machine().lower() in ("x86_64", "amd64"):
         assert done.stderr.count("no fused multiply-add") == 1

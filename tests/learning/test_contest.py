@@ -2,7 +2,6 @@
 
 import csv
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +13,6 @@ from smo_gym.learning import bootstrap, contest, contest_table
 from smo_gym.learning.contest import FAILED, Contender, Scores
 from smo_gym.policies.frozen import Card, MlpPolicy
 
-ROOT = Path(__file__).resolve().parents[2]
 K = np.array([7.197, -4.026, 10.96, -0.9999])  # of configs/article.yaml
 
 
@@ -228,6 +226,7 @@ def test_a_missing_extra_is_named(monkeypatch, capsys):
     assert 'pip install "smo_gym[rl]"' in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_interval_from_five_seeds_covers_95_percent_and_a_plain_percentile_interval_does_not(monkeypatch):
     def coverage(runs=150):
         """How often the interval of a learned policy's ratio to a law holds the true one, 1."""

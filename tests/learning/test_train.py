@@ -3,7 +3,6 @@
 import os
 import pickle
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,6 @@ from smo_gym.cli import train
 from smo_gym.evaluation import configs
 from smo_gym.learning import measurement, settings, training
 from smo_gym.policies import MlpPolicy
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture

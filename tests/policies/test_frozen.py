@@ -192,7 +192,7 @@ def test_the_control_period_is_that_of_training(tmp_path):
 
 
 def test_nothing_of_torch_is_needed():
-    code = "import sys, smo_gym.learning as l; l.shipped('SMOPendulum-v0'); assert 'torch' not in sys.modules"
+    code = "import sys, smo_gym.policies as p; p.shipped('SMOPendulum-v0'); assert 'torch' not in sys.modules"
     subprocess.run([sys.executable, "-W", "error", "-c", code], check=True)
 
 

@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 import pytest
 import yaml
+from conftest import ROOT
 from stable_baselines3 import PPO, SAC
 
 from smo_gym import SlidingModeObserver
@@ -18,7 +19,6 @@ from smo_gym.evaluation import configs, scenario
 from smo_gym.policies.frozen import Card, MlpPolicy
 from smo_gym.wrappers.view import KINDS, agent_view
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "own-agent.md").read_text(encoding="utf-8")
 
 # the gain of configs/article.yaml

@@ -2,17 +2,15 @@
 
 import importlib.util
 import sys
-from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
+from conftest import ROOT
 
 from smo_gym import CartPendulum, ObserverWrapper, Oracle, SlidingModeObserver, VectorObserverWrapper
 
-spec = importlib.util.spec_from_file_location(
-    "extremes", Path(__file__).resolve().parents[2] / "benchmarks" / "extremes.py"
-)
+spec = importlib.util.spec_from_file_location("extremes", ROOT / "benchmarks" / "extremes.py")
 extremes = importlib.util.module_from_spec(spec)
 sys.modules["extremes"] = extremes  # its dataclass looks its module up
 spec.loader.exec_module(extremes)

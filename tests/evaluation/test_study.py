@@ -1,0 +1,63 @@
+"""Studies: what single runs give, and more of them."""
+
+import gymnasium
+import numpy as np
+import pytest
+from conftest import SMALL
+
+import smo_gym
+from smo_gym import LQR, CartPendulum
+from smo_gym.evaluation import scenario, study
+
+K = [7.234, -4.132, 11.075, -1.025]
+
+
+def test_a_study_is_what_single_runs_give(small):
+    groups = study.groups([small], ["lqr"], ["without", "with", "oracle"], 3)
+    assert [(g.uncertainty, g.arm, g.runs) for g in groups][:4] == [
+        (0.0, "without", 1),
+        (0.0, "with", 1),
+        (0.0, "oracle", 1),
+        (0.1, "without", 3),
+    ]
+    outcomes = study.measure(groups, seed=7)
+    delta = np.random.default_rng([7, 2]).uniform(-1, 1, 3)
+    for arm in ("without", "with", "oracle"):
+        (outcome,) = (o for o in outcomes if o.group.arm == arm and o.group.uncertainty == 0.2)
+        settings = {} if arm == "oracle" else {"compensation": arm == "with", "slopes": (12.0, 12.0)}
+        env = gymnasium.make("SMOPendulum-v0", **small.environment_options)
+        env = smo_gym.ObserverWrapper(env, "oracle" if arm == "oracle" else "smo", **settings)
+        plant = CartPendulum().perturbed(0.2 * delta)
+        observation, _ = env.reset(options={"state": [1.0, 1.0, 0.1, 0.01], "params": plant})
+        squares, truncated = [], False
+        while not truncated:
+            observation, _, _, truncated, info = env.step(LQR(K).predict(observation)[0])
+            squares += [*info["samples"][:, 1] ** 2]
+        assert outcome.metrics["mse_theta"][2] == pytest.approx(np.mean(squares), rel=1e-12)
+
+
+def test_more_runs_add_to_those_that_were_there():
+    assert (study.deviations(3, 20)[:5] == study.deviations(3, 5)).all()
+    assert (study.deviations(4, 5) != study.deviations(3, 5)).all()
+
+
+def test_a_scenario_of_the_upright_plant_is_upright(tmp_path):
+    path = tmp_path / "upright.yaml"
+    changes = (
+        ("SMOPendulum-v0", "SMOPendulumUpright-v0"),
+        ("[7.234, -4.132, 11.075, -1.025]", "[-3.16, -101.39, -7.16, -21.04]"),
+    )
+    text = SMALL.read_text().replace("[1.0, 1.0, 0.1, 0.01]", "[0.0, 0.1, 0.0, 0.0]")
+    for change in changes:
+        text = text.replace(*change)
+    path.write_text(text.replace("{value: 1.0,", "{value: 5.0,"))
+    groups = study.groups([scenario.load(path)], ["lqr"], ["with", "oracle"], 2)
+    for outcome in study.measure(groups, seed=0):
+        assert not outcome.failed.any()
+        assert outcome.metrics["peak_theta"].max() < 0.5
+        assert outcome.metrics["mse_theta"].max() < 0.1**2
+    hanging_gain = scenario.load(path).changed(environment="SMOPendulum-v0")
+    assert all(
+        o.metrics["mse_h"].max() > 1.0
+        for o in study.measure(study.groups([hanging_gain], ["lqr"], ["oracle"], 1), seed=0)
+    )
