@@ -96,6 +96,14 @@ class Loop:
         rows: all rows, (rows, n): signals, then each part's own.
         n: number of slots.
         substeps: sampling instants in a control period.
+        x: states, (4, n); like all that follow a view of the rows.
+        y: measurements [h, theta] now, (2, n).
+        u: force in N, (n,).
+        xhat: estimates, (4, n).
+        x_d: where the states should be, (4, n).
+        alive: 1 in slots that go on, 0 in those that hold still, (n,).
+        failed: 1 in slots whose run has failed, (n,).
+        reward: of the last control period, (n,).
 
     Args:
         n: number of slots.
@@ -118,6 +126,7 @@ class Loop:
         self._own = dict(zip(self.parts, (slice(a, b) for a, b in pairwise(edges)), strict=True))
         self.rows = np.zeros((edges[-1], n))
         self._sections = self._programs()
+        self._show()
         self.start(slice(None), np.zeros((4, n)))
 
     def _programs(self) -> list[tuple[int, int, tuple[NDArray[np.int64], ...]]]:
@@ -143,53 +152,21 @@ class Loop:
             sections.append((start, stop, programs))
         return sections
 
+    def _show(self) -> None:
+        """Signals by name, as views of the rows."""
+        rows = self.rows
+        self.x, self.y, self.u = rows[X : X + 4], rows[Y : Y + 2], rows[U]
+        self.xhat, self.x_d = rows[XHAT : XHAT + 4], rows[XD : XD + 4]
+        self.alive, self.failed, self.reward = rows[ALIVE], rows[FAILED], rows[REWARD]
+
     def __getstate__(self) -> dict[str, Any]:
-        """Without the programs: an address holds in one process alone."""
-        return {name: value for name, value in vars(self).items() if name != "_sections"}
+        """Without views, which would be copies, and without programs: an address holds in one process alone."""
+        return {name: vars(self)[name] for name in ("n", "substeps", "parts", "rows", "_own")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._sections = self._programs()
-
-    @property
-    def x(self) -> Array:
-        """States, (4, n); like all that follow a view."""
-        return self.rows[X : X + 4]
-
-    @property
-    def y(self) -> Array:
-        """Measurements [h, theta] now, (2, n)."""
-        return self.rows[Y : Y + 2]
-
-    @property
-    def u(self) -> Array:
-        """Force in N, (n,)."""
-        return np.asarray(self.rows[U])
-
-    @property
-    def xhat(self) -> Array:
-        """Estimates, (4, n)."""
-        return self.rows[XHAT : XHAT + 4]
-
-    @property
-    def x_d(self) -> Array:
-        """Where the states should be, (4, n)."""
-        return self.rows[XD : XD + 4]
-
-    @property
-    def alive(self) -> Array:
-        """1 in slots that go on, 0 in those that hold still, (n,)."""
-        return np.asarray(self.rows[ALIVE])
-
-    @property
-    def failed(self) -> Array:
-        """1 in slots whose run has failed, (n,)."""
-        return np.asarray(self.rows[FAILED])
-
-    @property
-    def reward(self) -> Array:
-        """Of the last control period, (n,)."""
-        return np.asarray(self.rows[REWARD])
+        self._show()
 
     def own(self, role: str) -> Array:
         """A part's own rows, (rows, n)."""

@@ -87,6 +87,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self._cut = np.full(num_envs, self.task.steps)  # and the one that ends its episode
         self._terminated = np.zeros(num_envs, dtype=np.bool_)
         self._truncated = np.zeros(num_envs, dtype=np.bool_)
+        self._waiting = False  # whether a slot may have ended
         self._everywhere = np.ones(num_envs, dtype=np.bool_)
         self._everywhere.flags.writeable = False  # infos share it
 
@@ -129,20 +130,19 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         """Hold one force a slot over one control period."""
         if not self._generators:
             raise ResetNeeded("no episode has begun: call reset() before step()")
-        over = self._terminated | self._truncated
-        waiting = np.count_nonzero(over) > 0
-        loop, samples = self.loop, np.empty((self.task.substeps, 2, self.num_envs))
-        loop.u[:] = checked_force(actions, self.num_envs, over if waiting else None)
-        if waiting:
+        loop, samples, over = self.loop, np.empty((self.loop.substeps, 2, self.num_envs)), None
+        if self._waiting:
+            over = self._terminated | self._truncated
             loop.alive[over] = 0.0
-        self._k[~over] += 1
+        loop.u[:] = checked_force(actions, self.num_envs, over)
+        self._k += 1 if over is None else ~over
         if self._desired is not None:
             loop.x_d[:] = self._desired.states[self._k].T
         loop.run(positions=samples)
         reward, terminated = loop.reward.copy(), loop.failed > 0.0
         truncated = (self._k == self._cut) & ~terminated
         force = loop.u.copy()
-        if waiting:
+        if over is not None:
             if self.autoreset_mode is AutoresetMode.DISABLED:
                 terminated[over], truncated[over] = self._terminated[over], self._truncated[over]
             else:  # the step after the end is the reset (NEXT_STEP)
@@ -152,7 +152,8 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self._terminated, self._truncated = terminated.copy(), truncated.copy()
         info = self._info(samples, force)
         ended = terminated | truncated
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and np.count_nonzero(ended):
+        self._waiting = bool(np.count_nonzero(ended))
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._waiting:
             info = self._restart(ended, info)
         return self._observation(), reward, terminated, truncated, info
 
@@ -211,6 +212,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
     def hold(self, slots: Flags) -> None:
         """End the episodes of the marked slots, (n,), here: where nothing restarts them they hold still."""
         self._truncated |= slots & ~self._terminated
+        self._waiting = True
 
     def _mask(self, mask: Any) -> Flags:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
@@ -262,7 +264,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
 
     def _still(self) -> Array:
         """Samples (substeps, 2, n) of plants that have not moved."""
-        return np.repeat(self.loop.x[None, :2], self.task.substeps, axis=0)
+        return np.repeat(self.loop.x[None, :2], self.loop.substeps, axis=0)
 
     def _observation(self) -> Array:
         if self._desired is None:

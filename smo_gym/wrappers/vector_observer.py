@@ -59,11 +59,12 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         self._see = getattr(self._estimator, "see", None)
         self.plugged = isinstance(self._estimator, Plugged)
         self._mode = env.metadata["autoreset_mode"]
-        self._over = np.zeros(n, dtype=np.bool_)
+        self._over, self._any_over = np.zeros(n, dtype=np.bool_), False
         self._none, self._every = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.bool_)
         for shared in (self._none, self._every):
             shared.flags.writeable = False  # infos share them
         base = env.unwrapped
+        self._alone = env is base  # nothing stands between that could change what is measured
         self._show = base.show if isinstance(base, PendulumVectorEnv) else lambda xhat: None
         self.single_observation_space = space_of(env.single_observation_space)
         self.observation_space = space_of(env.observation_space)
@@ -76,44 +77,45 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         started = (options or {}).get("reset_mask", self._every)
         self._restart(started, observation, info)
         self._over[started] = False
-        return self._append(observation, info, self._none), info
+        return self._append(observation, info, self._estimator.xhat, self._none), info
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Run a control period and bring the estimates to its end."""
         observation, reward, terminated, truncated, info = self.env.step(actions)
         ended = np.logical_or(terminated, truncated)
+        any_ended = bool(np.count_nonzero(ended))
         same_step = self._mode is AutoresetMode.SAME_STEP
-        restarted = ended if same_step else self._over
-        any_restarted = np.count_nonzero(restarted) > 0
+        restarted, any_restarted = (ended, any_ended) if same_step else (self._over, self._any_over)
         last = _at_the_end(info) if same_step and any_restarted else info
         if not self.plugged:
             self._estimator.update(np.ascontiguousarray(last["samples"].transpose(1, 2, 0)), last["force"])
             if self._see is not None:
                 self._see(self._every, last["state"].T)
-        lost = lost_of(self._estimator.xhat)
+        xhat = self._estimator.xhat
+        lost = lost_of(xhat)
         if lost is not None:
             self._restart(lost, last["samples"][:, -1], last)
+            xhat = self._estimator.xhat
         failed: Flags = self._none if lost is None else lost
         if same_step and any_restarted:
-            final_obs, xhat = info["final_obs"], self._estimator.xhat
+            final_obs = info["final_obs"]
             for i in np.flatnonzero(ended):
                 final_obs[i] = np.concatenate([final_obs[i], xhat[:, i]])
             info["final_info"] |= {"estimate_failed": only(failed, ended), "_estimate_failed": ended.copy()}
         if any_restarted and self._mode is not AutoresetMode.DISABLED:
             self._restart(restarted, observation, info)
-            failed = only(failed, ~restarted)
-        self._over = ended
-        return self._append(observation, info, failed), reward, terminated, truncated, info
+            failed, xhat = only(failed, ~restarted), self._estimator.xhat
+        self._over, self._any_over = ended, any_ended
+        return self._append(observation, info, xhat, failed), reward, terminated, truncated, info
 
     def _restart(self, slots: Flags, observation: Array, info: dict[str, Any]) -> None:
         self._estimator.reset(slots, observation[:, :2].T)
         if self._see is not None:
             self._see(slots, info["state"].T)
 
-    def _append(self, observation: Array, info: dict[str, Any], failed: Flags) -> Array:
-        y, xhat = info["samples"][:, -1], self._estimator.xhat
-        if np.count_nonzero(observation[:, :2] != y):
-            raise unseen(observation[:, :2], y)
+    def _append(self, observation: Array, info: dict[str, Any], xhat: Array, failed: Flags) -> Array:
+        if not self._alone and np.count_nonzero(observation[:, :2] != info["samples"][:, -1]):
+            raise unseen(observation[:, :2], info["samples"][:, -1])
         info["estimate_failed"], info["_estimate_failed"] = failed, self._every
         self._show(xhat)
         appended = np.empty((len(observation), observation.shape[1] + 4))
