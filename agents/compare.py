@@ -22,6 +22,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from smo_gym import files
+from smo_gym.cli import computing
 from smo_gym.cli.arguments import Parser, positive, whole
 from smo_gym.cli.entry import command
 from smo_gym.cli.progress import simulated
@@ -61,6 +62,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         help="scenario (default: configs/regulation.yaml, Table 4)",
     )
     add("--out", type=Path, default=Path("results/learning"), metavar="DIR", help="folder (default: results/learning)")
+    computing.add(parser)
     return parser.parse_args(arguments)
 
 
@@ -76,11 +78,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     contenders += contest.designed(place)
     place = contest.entered(place, contenders)
     groups = [group for contender in contenders for group in contest.groups(place, contender, args.runs)]
-    with files.claimed(args.out, RESULTS) as out:
+    with files.claimed(args.out, RESULTS) as out, computing.computing(args, out) as measure:
         for line in left_out:
             print(line, file=sys.stderr)
         with simulated(groups) as bar:
-            scores = contest.measure(place, contenders, args.runs, args.seed, bar.update)
+            scores = contest.measure(place, contenders, args.runs, args.seed, bar.update, measure)
         rows: list[contest_table.Row] = []
         answers: dict[str, list[str]] = {}
         asked = contest_table.questions(scores)

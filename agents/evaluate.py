@@ -25,6 +25,7 @@ import yaml
 from tqdm import tqdm
 
 from smo_gym import files
+from smo_gym.cli import computing
 from smo_gym.cli.arguments import Parser, fraction, one_of, positive, several, versions, whole
 from smo_gym.cli.entry import Stop, command, said
 from smo_gym.cli.progress import simulated
@@ -96,6 +97,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     add("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for the results (default: results)")
+    computing.add(parser)
     return parser.parse_args(arguments)
 
 
@@ -172,14 +174,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise ValueError(f"--report {args.report}: is one of the results in --out {args.out}")
         page.check(groups, args.report)
     runs = sum(group.runs for group in groups)
-    with files.claimed(args.out, (*RESULTS, *drawings)) as out:
+    with (
+        files.claimed(args.out, (*RESULTS, *drawings)) as out,
+        computing.computing(args, out, args.modules) as measure,
+    ):
         if drawn:
             files.prepare(out / "figures")
         print("\n".join([*left_out_agents, f"{runs} runs to do"]), file=sys.stderr, flush=True)
         try:
             with simulated(groups) as bar:
                 samples = figures.SAMPLES if drawn or args.report else None
-                outcomes = study.measure(groups, args.seed, bar.update, samples)
+                outcomes = measure(groups, args.seed, bar.update, samples)
         except ValueError as error:  # an agent's force that is not finite, or its error
             raise ValueError(f"{error}; nothing was written") from None
         numbers = results(outcomes)
@@ -213,8 +218,9 @@ def contents(
     numbers: Sequence[Result],
 ) -> dict[str, str]:
     """The files of results by name, the settings they come from last."""
+    told = {key: value for key, value in vars(args).items() if key not in computing.OPTIONS}
     resolved = {
-        "command": {key: str(value) if isinstance(value, Path) else value for key, value in vars(args).items()},
+        "command": {key: str(value) if isinstance(value, Path) else value for key, value in told.items()},
         "versions": versions(),
         "scenarios": [one.model_dump(mode="json") for one in scenarios],
     }

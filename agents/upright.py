@@ -19,6 +19,7 @@ from scipy import stats
 from tabulate import tabulate
 
 from smo_gym import files
+from smo_gym.cli import computing
 from smo_gym.cli.arguments import Parser, whole
 from smo_gym.cli.entry import command
 from smo_gym.cli.progress import simulated
@@ -43,12 +44,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--runs", type=whole(1), default=1000, metavar="N", help="random plants a cell (default 1000)")
     parser.add_argument("--seed", type=whole(0), default=0, help="of the random plants (default 0)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for falls.csv and falls.md (default: none)")
+    computing.add(parser)
     args = parser.parse_args(arguments)
     one = scenario.load(args.config)
     groups = [g for g in study.groups([one], list(one.controllers), list(ARMS), args.runs) if g.uncertainty > 0.0]
-    with contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS) as out:
+    claimed = contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS)
+    with claimed as out, computing.computing(args, out) as measure:
         with simulated(groups) as bar:
-            outcomes = study.measure(groups, args.seed, bar.update)
+            outcomes = measure(groups, args.seed, bar.update)
         told = f"Falls in percent of {args.runs} random plants, with 95 % Wilson intervals:\n\n"
         try:
             if out is not None:
