@@ -11,7 +11,7 @@ import smo_gym
 from smo_gym.cli.arguments import versions
 
 ROOT = Path(__file__).resolve().parent.parent
-EXTRAS = ("rl", "render", "plots", "report", "reference")
+EXTRAS = ("rl", "render", "plots", "report", "reference", "dask")
 
 
 def test_the_lowest_versions_that_are_tried_are_the_lowest_that_are_allowed():
