@@ -10,12 +10,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import fields
 from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import gymnasium
+import numba
 import numpy as np
+import safetensors
+import scipy
 from llvmlite.binding import get_host_cpu_name
 
 from .. import files
@@ -28,7 +30,7 @@ FOLDER = ".groups"
 """Inside of the folder for results."""
 SUFFIX = ".group"
 PACKAGE = Path(__file__).resolve().parents[1]
-COMPUTES = ("gymnasium", "numba", "numpy", "safetensors", "scipy")
+COMPUTES = (gymnasium, numba, np, safetensors, scipy)
 """Packages whose versions may move a bit."""
 _DIGEST = hashlib.sha256().digest_size
 
@@ -41,7 +43,7 @@ def code() -> dict[str, str]:
     digest = hashlib.sha256()
     for path in sources:
         digest.update(f"{path.relative_to(PACKAGE).as_posix()}\0{_hash(path)}\n".encode())
-    versions = {name: metadata.version(name) for name in COMPUTES}
+    versions = {package.__name__: package.__version__ for package in COMPUTES}
     return {"python": platform.python_version(), **versions, "smo_gym": digest.hexdigest()}
 
 
