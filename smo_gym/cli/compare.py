@@ -19,6 +19,7 @@ from tqdm import tqdm
 from .. import files
 from ..evaluation import configs, formats, scenario
 from ..learning import contest
+from . import computing
 from .arguments import Parser, positive
 from .entry import command
 from .progress import simulated
@@ -55,6 +56,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         help="scenario (default: configs/regulation.yaml, Table 4)",
     )
     parser.out("results/learning")
+    computing.add(parser)
     return parser.parse_args(arguments)
 
 
@@ -69,11 +71,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     contenders += contest.designed(place)
     place = contest.entered(place, contenders)
     groups = [group for contender in contenders for group in contest.groups(place, contender, args.runs)]
-    with files.claimed(args.out, RESULTS) as out:
+    with files.claimed(args.out, RESULTS) as out, computing.computing(args, out) as measure:
         for line in left_out:
             print(line, file=sys.stderr)
         with simulated(groups) as bar:
-            scores = contest.measure(place, contenders, args.runs, args.seed, bar.update)
+            scores = contest.measure(place, contenders, args.runs, args.seed, bar.update, measure)
         rows: list[contest_table.Row] = []
         answers: dict[str, list[str]] = {}
         asked = contest_table.questions(scores)

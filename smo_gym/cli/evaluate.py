@@ -27,6 +27,7 @@ from ..evaluation.report import figures, page, tables
 from ..evaluation.statistics import Result, results
 from ..policies import named
 from ..validation import choice, unknown
+from . import computing
 from .arguments import Parser, fraction, one_of, positive, several, versions
 from .entry import Stop, command, said, typed
 from .progress import simulated
@@ -92,6 +93,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     parser.out("results", "folder for the results")
+    computing.add(parser)
     return parser.parse_args(arguments)
 
 
@@ -166,14 +168,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise ValueError(f"--report {args.report}: is one of the results in --out {args.out}")
         page.check(groups, args.report)
     runs = sum(group.runs for group in groups)
-    with files.claimed(args.out, (*RESULTS, *drawings)) as out:
+    with (
+        files.claimed(args.out, (*RESULTS, *drawings)) as out,
+        computing.computing(args, out, args.modules) as measure,
+    ):
         if drawn:
             files.prepare(out / "figures")
         print("\n".join([*left_out_agents, f"{runs} runs to do"]), file=sys.stderr, flush=True)
         try:
             with simulated(groups) as bar:
                 samples = figures.SAMPLES if drawn or args.report else None
-                outcomes = study.measure(groups, args.seed, bar.update, samples)
+                outcomes = measure(groups, args.seed, bar.update, samples)
         except ValueError as error:  # an agent's force that is not finite, or its error
             raise ValueError(f"{error}; nothing was written") from None
         numbers = results(outcomes)
@@ -206,8 +211,9 @@ def contents(
     numbers: Sequence[Result],
 ) -> dict[str, str]:
     """The files of results by name, the settings they come from last."""
+    told = {key: value for key, value in vars(args).items() if key not in computing.OPTIONS}
     resolved = {
-        "command": {key: str(value) if isinstance(value, Path) else value for key, value in vars(args).items()},
+        "command": {key: str(value) if isinstance(value, Path) else value for key, value in told.items()},
         "versions": versions(),
         "scenarios": [place.model_dump(mode="json") for place in scenarios],
     }

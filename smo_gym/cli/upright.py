@@ -17,6 +17,7 @@ from ..article import WITHOUT
 from ..evaluation import configs, scenario, study
 from ..evaluation.arms import ARMS, THEOREM
 from ..evaluation.formats import as_csv, markdown
+from . import computing
 from .arguments import Parser
 from .entry import command
 from .progress import simulated
@@ -37,12 +38,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.runs(1000, "random plants a cell")
     parser.seed("the random plants")
     parser.out(None, "folder for falls.csv and falls.md")
+    computing.add(parser)
     args = parser.parse_args(arguments)
     place = scenario.load(args.config)
     groups = [g for g in study.groups([place], list(place.controllers), list(TITLES), args.runs) if g.uncertainty > 0.0]
-    with contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS) as out:
+    claimed = contextlib.nullcontext() if args.out is None else files.claimed(args.out, RESULTS)
+    with claimed as out, computing.computing(args, out) as measure:
         with simulated(groups) as bar:
-            outcomes = study.measure(groups, args.seed, bar.update)
+            outcomes = measure(groups, args.seed, bar.update)
         told = f"Falls in percent of {args.runs} random plants, with 95 % Wilson intervals:\n\n"
         try:
             if out is not None:

@@ -57,7 +57,7 @@ def driven(env: PendulumVectorEnv, law: Any, parts: Mapping[str, Part], watch: W
             raise ValueError(f"{title(law)}: action={refused[slot]} (slot {slot}) must be finite")
         watch.look(k + periods, loop)
         watch.progress(periods)
-        if not loop.alive.any():
+        if not watch.recorders and not loop.alive.any():
             break
     return loop
 
@@ -124,7 +124,7 @@ def asked(
         if k % 100 == 0:
             watch.progress(100)
         failures = int(np.count_nonzero(failed))
-        if failures == n and k % (watch.stride or 1) == 0:
+        if failures == n and not watch.recorders:
             break
     watch.progress(task.steps % 100)
     loop.failed[:] = failed

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
-from dataclasses import dataclass
+import builtins
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from reprlib import repr as short
 from typing import Any
 
@@ -17,6 +19,7 @@ from ..plant import STATE_NAMES
 from ..typing import Array, Flags
 from ..wrappers import VectorObserverWrapper
 from .arms import arm
+from .pieces import Keeper, Map, cut
 from .rollout import rollout
 from .scenario import ControllerSettings, Scenario
 from .traces import Traces
@@ -119,38 +122,95 @@ def deviations(seed: int, runs: int) -> Array:
     return np.array([np.random.default_rng([seed, run]).uniform(-1.0, 1.0, 3) for run in range(runs)])
 
 
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Groups that run as one batch, wherever that is."""
+
+    indices: tuple[int, ...]
+    """Of its groups among all."""
+    groups: tuple[Group, ...]
+    options: dict[str, Any]
+    """Of their environment."""
+    seed: int
+    samples: int | None
+
+
+Found = tuple[tuple[int, ...], list[Outcome]]
+"""What a piece gave, and where it belongs."""
+
+
 def measure(
     wanted: Sequence[Group],
     seed: int,
     progress: Callable[[float], object] = lambda seconds: None,
     samples: int | None = None,
+    *,
+    map: Map = builtins.map,
+    store: Keeper | None = None,
 ) -> list[Outcome]:
-    """Run all groups.
+    """Run all groups that are not kept. How they are cut, where they run and what is kept does not change a bit.
 
     Args:
-        wanted: the groups; those that share environment, controller and kind of observer are one batch.
+        wanted: the groups; those that share environment, controller and kind of observer are batches.
         seed: of the plants.
         progress: called with the simulated seconds (over all slots) done since the last call.
         samples: trace the first runs of each group at about so many instants (at least so many, where an episode has
             them, and fewer than twice as many); None traces nothing.
+        map: how pieces are run; function and pieces can be pickled.
+        store: keeps every group as soon as its piece is done, and gives those of before.
 
     Raises:
         ValueError: ``samples`` is no positive integer.
     """
     if samples is not None and samples < 1:
         raise ValueError(f"samples={samples!r} must be a positive integer")
-    options = {id(group.scenario): group.scenario.environment_options for group in wanted}
-    batches: dict[Any, list[int]] = {}
-    for index, (group, observer) in enumerate(zip(wanted, _observers(wanted), strict=True)):
-        scenario = group.scenario
-        key = (scenario.environment, repr(options[id(scenario)]), repr(group.settings), observer)
-        batches.setdefault(key, []).append(index)
+    keys = [store.key(group, seed, samples) if store else None for group in wanted]
     outcomes: dict[int, Outcome] = {}
-    for indices in batches.values():
-        batch = [wanted[i] for i in indices]
-        found = _run(batch, options[id(batch[0].scenario)], seed, progress, samples)
-        outcomes.update(zip(indices, found, strict=True))
+    for index, key in enumerate(keys):
+        kept = store.get(key, wanted[index]) if store and key else None
+        if kept is not None:
+            outcomes[index] = kept
+    progress(simulated_seconds(outcome.group for outcome in outcomes.values()))
+    here = map is builtins.map  # only here can it be told what a piece has done before it is done
+    run = partial(run_piece, progress=progress) if here else run_piece
+    for indices, found in map(run, _pieces(wanted, frozenset(outcomes), seed, samples)):
+        for index, outcome in zip(indices, found, strict=True):
+            group, key = wanted[index], keys[index]
+            outcomes[index] = replace(outcome, group=group)
+            if store and key and store.key(group, seed, samples) == key:  # no file that it names has changed meanwhile
+                store.put(key, outcomes[index])
+        if not here:
+            progress(simulated_seconds(wanted[index] for index in indices))
     return [outcomes[index] for index in range(len(wanted))]
+
+
+def run_piece(piece: Piece, progress: Callable[[float], object] = lambda seconds: None) -> Found:
+    """Run a piece of work of :func:`measure`."""
+    found = _run(piece.groups, piece.options, piece.seed, progress, piece.samples)
+    return piece.indices, [replace(outcome, traces=_in_rows(outcome.traces)) for outcome in found]
+
+
+def _pieces(wanted: Sequence[Group], done: Collection[int], seed: int, samples: int | None) -> Iterator[Piece]:
+    """What is left to do, cut as if nothing were done: pieces are the same ones, however often a study was stopped."""
+    options = {id(group.scenario): group.scenario.environment_options for group in wanted}
+
+    kinds = [
+        (group.scenario.environment, repr(options[id(group.scenario)]), repr(group.settings), observer)
+        for group, observer in zip(wanted, _observers(wanted), strict=True)
+    ]
+    for piece in cut(kinds, [group.runs for group in wanted]):
+        if left := tuple(index for index in piece if index not in done):
+            groups = tuple(wanted[index] for index in left)
+            yield Piece(left, groups, options[id(groups[0].scenario)], seed, samples)
+
+
+def _in_rows(traces: Traces | None) -> Traces | None:
+    """Traces laid out in memory as they come from a file or another process: sums over them have the same bits."""
+    if traces is None:
+        return None
+    arrays: dict[str, Any] = {field.name: getattr(traces, field.name) for field in fields(Traces)}
+    in_rows: Any = {name: None if array is None else np.ascontiguousarray(array) for name, array in arrays.items()}
+    return Traces(**in_rows)
 
 
 def _observers(wanted: Iterable[Group]) -> list[Hashable]:

@@ -129,6 +129,7 @@ def measure(
     runs: int,
     seed: int,
     progress: Callable[[float], object] = lambda seconds: None,
+    measured: Callable[..., list[study.Outcome]] = study.measure,
 ) -> list[Scores]:
     """All contenders on the same plants.
 
@@ -138,9 +139,10 @@ def measure(
         runs: plants a level.
         seed: of the plants.
         progress: as in :func:`smo_gym.evaluation.study.measure`.
+        measured: that function, or one like it that runs the groups elsewhere.
     """
     wanted = [groups(scenario, contender, runs) for contender in contenders]
-    outcomes = iter(study.measure([group for one in wanted for group in one], seed, progress))
+    outcomes = iter(measured([group for one in wanted for group in one], seed, progress))
     found = []
     for contender, part in zip(contenders, wanted, strict=True):
         rows: list[Any] = [next(outcomes) for _ in part]
