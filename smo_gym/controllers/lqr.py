@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 from numpy.linalg import LinAlgError
 from numpy.typing import ArrayLike
-from scipy.linalg import solve_continuous_are
 
 from ..kernels.blocks import U, at, block, error, four, offsets, put
 from ..loop import Part, columns
@@ -62,6 +61,8 @@ class LQR(Feedback):
         Raises:
             ValueError: a weight is not allowed, or under these weights no gain makes x = 0 asymptotically stable.
         """
+        from scipy.linalg import solve_continuous_are  # takes a while, and only designing needs it
+
         A, B = nominal(model).linearise()
         weight, r = weights(Q, R)
         try:

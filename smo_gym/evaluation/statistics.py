@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 from ..article import Cell, published
 from ..typing import Array, Flags
@@ -172,14 +172,17 @@ def _prediction(values: Array) -> float:
     n = values.size
     if n < 2:
         return math.nan
-    return float(stats.t.ppf(0.975, n - 1) * values.std(ddof=1) * math.sqrt(1.0 / n + 1.0 / PRINTED_RUNS))
+    return float(stdtrit(n - 1, 0.975) * values.std(ddof=1) * math.sqrt(1.0 / n + 1.0 / PRINTED_RUNS))
 
 
 def _interval(values: Array) -> tuple[float, float]:
     """The 95 % interval of the mean over runs, Student's; none for fewer than two, a point where all agree."""
-    if values.size < 2:
+    n = values.size
+    if n < 2:
         return math.nan, math.nan
     if np.ptp(values) == 0.0:
         return float(values[0]), float(values[0])
-    interval = stats.ttest_1samp(values, 0.0).confidence_interval(0.95)
-    return float(interval.low), float(interval.high)
+    mean = values.mean()
+    error = np.sqrt(np.mean((values - mean) ** 2) * (n / (n - 1)) / n)
+    tail = (1.0 - 0.95) / 2.0
+    return float(stdtrit(n - 1, tail) * error + mean), float(stdtrit(n - 1, 1.0 - tail) * error + mean)

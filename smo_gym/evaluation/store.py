@@ -101,19 +101,24 @@ class Store:
         if data[:_DIGEST] != _sum(key, data[_DIGEST:]):
             return None
         with np.load(io.BytesIO(data[_DIGEST:]), allow_pickle=False) as arrays:
-            parts: dict[str, dict[str, Any]] = {"": {}, "metric": {}, "trace": {}}
-            for name in arrays.files:
-                kind, _, rest = name.rpartition(":")
-                parts[kind][rest] = arrays[name]
-        traces = None
-        if parts["trace"]:
-            traces = Traces(**{field.name: None for field in fields(Traces)} | parts["trace"])
-        return Outcome(group, parts["metric"], parts[""]["failed"], traces, parts[""].get("plants"))
+            found = {name: arrays[name] for name in arrays.files}
+        traces: dict[str, Any] = {field.name: found.get(f"trace:{field.name}") for field in fields(Traces)}
+        return Outcome(
+            group,
+            dict(zip(found["names"].tolist(), found["metrics"], strict=True)),
+            found["failed"],
+            Traces(**traces) if traces["time"] is not None else None,
+            found.get("plants"),
+        )
 
     def put(self, key: str, outcome: Outcome) -> None:
         """Keep what a group gave. Where it cannot be written it is not kept, and a later study runs the group again."""
-        arrays: dict[str, Any] = {f"metric:{name}": values for name, values in outcome.metrics.items()}
-        arrays |= {"failed": outcome.failed, "plants": outcome.plants}
+        arrays: dict[str, Any] = {
+            "names": np.array(list(outcome.metrics)),
+            "metrics": np.array(list(outcome.metrics.values())),
+            "failed": outcome.failed,
+            "plants": outcome.plants,
+        }
         if outcome.traces is not None:
             arrays |= {f"trace:{field.name}": getattr(outcome.traces, field.name) for field in fields(Traces)}
         file = io.BytesIO()

@@ -7,6 +7,7 @@ vectorises, which it does not where they stand in a tuple or an attribute.
 """
 
 from collections.abc import Callable
+from functools import cache
 from itertools import accumulate
 from typing import Any, cast
 
@@ -107,8 +108,9 @@ def block(function: Block) -> Block:
     return kernel(function)
 
 
+@cache
 def address(function: Block) -> int:
-    """Where a block's machine code is, in this process; whoever calls it keeps the block alive.
+    """Where a block's machine code is, in this process.
 
     Raises:
         TypeError: ``function`` is no block.

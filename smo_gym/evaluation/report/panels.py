@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 from ...article import WITH, WITHOUT
 from ...typing import Array
@@ -144,6 +143,8 @@ def _bars(panel: Axes, name: str, cells: Sequence[Result]) -> None:
 def smooth(time: Array, force: Array) -> Array:
     """Forces (m, runs) averaged over :data:`WINDOW`."""
     window = max(int(np.searchsorted(time, WINDOW)), 1)
+    from scipy.ndimage import uniform_filter1d  # only who draws waits for it
+
     return np.asarray(uniform_filter1d(force, window, axis=0, mode="nearest"))
 
 
