@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -129,27 +129,24 @@ class Loop:
         self._show()
         self.start(slice(None), np.zeros((4, n)))
 
-    def _programs(self) -> list[tuple[int, int, tuple[NDArray[np.int64], ...]]]:
-        """Slots that are called alike, and their programs."""
+    def _programs(self) -> list[tuple[int, int, NDArray[np.int64], int, int]]:
+        """Slots that are called alike: first, one behind the last, program, and how it is divided."""
         ends = {role: np.cumsum([part.rows.shape[1] for part in each]) for role, each in self.parts.items()}
         bounds = sorted({0, self.n, *(int(end) for each in ends.values() for end in each)})
         sections = []
         for start, stop in pairwise(bounds):
-            mine = {
-                role: each[int(np.searchsorted(ends[role], start, side="right"))] for role, each in self.parts.items()
-            }
-            programs = tuple(
-                np.array(
-                    [
-                        (address(block), self._own[role].start, self._own[role].start + len(part.rows))
-                        for role, part in mine.items()
-                        if (block := getattr(part, when)) is not None
-                    ],
-                    dtype=np.int64,
-                ).reshape(-1, 3)
+            place = {role: int(np.searchsorted(each, start, side="right")) for role, each in ends.items()}
+            mine = {role: each[place[role]] for role, each in self.parts.items()}
+            calls = [
+                [
+                    (address(block), self._own[role].start, self._own[role].start + len(part.rows))
+                    for role, part in mine.items()
+                    if (block := getattr(part, when)) is not None
+                ]
                 for when in ("act", "sample", "close")
-            )
-            sections.append((start, stop, programs))
+            ]
+            program = np.array(list(chain(*calls)), dtype=np.int64).reshape(-1, 3)
+            sections.append((start, stop, program, len(calls[0]), len(calls[1])))
         return sections
 
     def _show(self) -> None:
@@ -226,26 +223,9 @@ class Loop:
         reference: Array = _NO_INSTANTS,
         recording: Array = _NO_SAMPLES,
         positions: Array = _NO_SAMPLES,
-        measured: Array = _NO_SAMPLES,
     ) -> None:
         """Drive whole control periods; arguments as of :func:`smo_gym.kernels.driver.drive`."""
-        end = begin + periods
-        cost = _MICROSECONDS_A_STEP * periods * self.substeps
-        for start, stop, (act, sample, close) in self._sections:
-            for_slots(
-                drive,
-                start,
-                stop,
-                cost,
-                self.rows,
-                act,
-                sample,
-                close,
-                begin,
-                end,
-                self.substeps,
-                reference,
-                recording,
-                positions,
-                measured,
-            )
+        end, cost = begin + periods, _MICROSECONDS_A_STEP * periods * self.substeps
+        told = (begin, end, self.substeps, reference, recording, positions)
+        for start, stop, *program in self._sections:
+            for_slots(drive, start, stop, cost, self.rows, *program, *told)

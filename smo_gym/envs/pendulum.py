@@ -11,7 +11,6 @@ import numpy as np
 from gymnasium import logger
 from gymnasium.error import ResetNeeded
 
-from ..kernels.blocks import FAILED, REWARD, XD, U, X, Y
 from ..loop import Part
 from ..plant import PARAMS
 from ..typing import Array
@@ -164,19 +163,18 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         self._steps_left -= 1
         k = self._steps - self._steps_left
         loop, samples = self.loop, np.empty((self._substeps, 2, 1))
-        rows = loop.rows
-        rows[U, 0] = force
+        loop.u[0] = force
         if self._desired is not None:
-            rows[XD : XD + 4, 0] = self._desired.states[k]
+            loop.x_d[:, 0] = self._desired.states[k]
         loop.run(positions=samples)
-        terminated = bool(rows[FAILED, 0] > 0.0)
+        terminated = loop.failed.item() > 0.0
         truncated = self._steps_left == 0 and not terminated
         if terminated:
             self._steps_left = 0
-        force = float(rows[U, 0])
+        force = loop.u.item()
         self._see(k, force)
         info = self._info(samples[:, :, 0], force, k)
-        return self._observation(k), float(rows[REWARD, 0]), terminated, truncated, info
+        return self._observation(k), loop.reward.item(), terminated, truncated, info
 
     def render(self) -> Any:
         """The frame of the mode: an array (height, width, 3) or, in a window, None."""
@@ -215,12 +213,12 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
             self.render()
 
     def _observation(self, k: int) -> Array:
-        y = self.loop.rows[Y : Y + 2, 0]
+        y = self.loop.y[:, 0]
         return y.copy() if self._desired is None else np.concatenate([y, self._desired.told[k]])
 
     def _info(self, samples: Array, force: float, k: int) -> dict[str, Any]:
         info = {
-            "state": self.loop.rows[X : X + 4, 0].copy(),
+            "state": self.loop.x[:, 0].copy(),
             "params": self._params.copy(),
             "force": force,
             "positions": samples,

@@ -16,16 +16,15 @@ def drive(
     start: int,
     stop: int,
     rows: Array,
-    act: Array,
-    sample: Array,
-    close: Array,
+    program: Array,
+    acts: int,
+    samples: int,
     begin: int,
     end: int,
     substeps: int,
     reference: Array,
     recording: Array,
     positions: Array,
-    measured: Array,
 ) -> None:
     """Control periods ``begin`` to ``end`` of slots ``start`` to ``stop``.
 
@@ -33,16 +32,15 @@ def drive(
         start: first slot.
         stop: one behind the last.
         rows: (rows, n), signals first, then each part's own; in place.
-        act: what is called when a control period begins, (blocks, 3): address, first of its own rows, one behind them.
-        sample: what is called at every sampling instant.
-        close: what is called when the period ends.
+        program: what is called, (blocks, 3): address, first of its own rows, one behind them.
+        acts: how many of these are called when a control period begins.
+        samples: how many of the next are called at every sampling instant; the others when the period ends.
         begin: first control period.
         end: one behind the last.
         substeps: sampling instants of a period.
         reference: x_d at each sampling instant from the very first on, (instants, 4), alike in all slots; or empty.
         recording: measurements in place of a sensor's, (substeps, 2, n), of a single period; or empty.
         positions: filled with the true positions of the last period, (substeps, 2, n); or empty.
-        measured: filled with its measurements, (substeps, 2, n); or empty.
     """
     work = np.empty(rows.shape[0] * LANES)
     for first in range(start, stop, LANES):
@@ -51,8 +49,8 @@ def drive(
         width = lanes if lanes == 1 else (lanes + VECTOR - 1) // VECTOR * VECTOR
         load(work, 0, rows, first, lanes, width)
         for k in range(begin, end):
-            for p in range(act.shape[0]):
-                call(act[p, 0], work, work[act[p, 1] * LANES : act[p, 2] * LANES], width)
+            for p in range(acts):
+                call(program[p, 0], work, work[program[p, 1] * LANES : program[p, 2] * LANES], width)
             for j in range(substeps):
                 if reference.shape[0] > 0:
                     for r in range(4):
@@ -62,14 +60,12 @@ def drive(
                     for i in range(2 * LANES):
                         work[Y0 * LANES + i] = work[Y * LANES + i]
                     load(work, Y, recording[j], first, lanes, width)
-                for p in range(sample.shape[0]):
-                    call(sample[p, 0], work, work[sample[p, 1] * LANES : sample[p, 2] * LANES], width)
+                for p in range(acts, acts + samples):
+                    call(program[p, 0], work, work[program[p, 1] * LANES : program[p, 2] * LANES], width)
                 if positions.shape[0] > 0:
                     store(work, X, positions[j], first, lanes)
-                if measured.shape[0] > 0:
-                    store(work, Y, measured[j], first, lanes)
-            for p in range(close.shape[0]):
-                call(close[p, 0], work, work[close[p, 1] * LANES : close[p, 2] * LANES], width)
+            for p in range(acts + samples, program.shape[0]):
+                call(program[p, 0], work, work[program[p, 1] * LANES : program[p, 2] * LANES], width)
             for i in range(width):
                 going = work[ALIVE * LANES + i]
                 work[ALIVE * LANES + i] = 0.0 if work[FAILED * LANES + i] > 0.0 else going

@@ -79,7 +79,7 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
             if self._see is not None:
                 self._see(self._every, info["state"][:, None])
         xhat = self._estimator.xhat[:, 0]
-        lost = not all(map(math.isfinite, xhat.tolist()))
+        lost = not math.isfinite(sum(xhat.tolist())) and not np.isfinite(xhat).all()
         if lost:
             self._restart(observation, info)
             xhat = self._estimator.xhat[:, 0]
@@ -91,9 +91,8 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
             self._see(self._every, info["state"][:, None])
 
     def _append(self, observation: Array, info: dict[str, Any], xhat: Array, lost: bool) -> Array:
-        y = info["samples"][-1]
-        if observation[0] != y[0] or observation[1] != y[1]:
-            raise unseen(observation[:2], y)
+        if not self._plugged and (observation[:2] != info["samples"][-1]).any():
+            raise unseen(observation[:2], info["samples"][-1])
         info["estimate_failed"] = lost
         self._show(xhat)
         return np.concatenate([observation, xhat])

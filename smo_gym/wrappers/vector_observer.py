@@ -64,7 +64,6 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         for shared in (self._none, self._every):
             shared.flags.writeable = False  # infos share them
         base = env.unwrapped
-        self._alone = env is base  # nothing stands between that could change what is measured
         self._show = base.show if isinstance(base, PendulumVectorEnv) else lambda xhat: None
         self.single_observation_space = space_of(env.single_observation_space)
         self.observation_space = space_of(env.observation_space)
@@ -114,7 +113,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
             self._see(slots, info["state"].T)
 
     def _append(self, observation: Array, info: dict[str, Any], xhat: Array, failed: Flags) -> Array:
-        if not self._alone and np.count_nonzero(observation[:, :2] != info["samples"][:, -1]):
+        if not self.plugged and np.count_nonzero(observation[:, :2] != info["samples"][:, -1]):
             raise unseen(observation[:, :2], info["samples"][:, -1])
         info["estimate_failed"], info["_estimate_failed"] = failed, self._every
         self._show(xhat)
