@@ -75,9 +75,9 @@ class Feedback:
         xhat, x_d = told(observation)
         single = xhat.ndim == 1
         n = 1 if single else len(xhat)
-        if self._alone is None or self._alone.n != n:
-            self._alone = Loop(n, 0, {"law": self.part(n)})
-        loop = self._alone
+        loop, self._alone = self._alone, None  # nobody else has it meanwhile
+        if loop is None or loop.n != n:
+            loop = Loop(n, 0, {"law": self.part(n)})
         loop.xhat[:], loop.x_d[:] = np.atleast_2d(xhat).T, np.atleast_2d(x_d).T
         own = loop.own("law")
         loop.restart("law", slice(None))
@@ -93,6 +93,7 @@ class Feedback:
         loop.run()
         after = tuple(row.copy() for row in own[: self.memory]) if self.memory else state
         u = loop.u[:, None].copy()
+        self._alone = loop
         return (u[0] if single else u), after
 
 
