@@ -16,7 +16,7 @@ from smo_gym.cli.commands import COMMANDS
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
 MODULE = [sys.executable, "-m", "smo_gym"]
-SHARED = {"arguments", "commands", "console", "entry", "progress", "starting"}
+SHARED = {"arguments", "cluster", "commands", "computing", "console", "entry", "processes", "progress", "starting"}
 posix = pytest.mark.skipif(os.name != "posix", reason="of POSIX systems")
 
 
@@ -75,7 +75,7 @@ def test_in_another_program_a_command_has_its_name_of_smo_gym(monkeypatch, capsy
         assert starting.program() is None
         assert not starting.is_command()
         assert commands.main(["evaluate", "--observer", "oracel"]) == 2
-        assert capsys.readouterr().err.startswith("smo-gym evaluate: error: argument --observer: unknown observer")
+        assert capsys.readouterr().err.startswith("smo-gym evaluate: error: unknown observer 'oracel'")
     monkeypatch.setattr(sys, "argv", [str(ROOT / "agents" / "train.py")])
     assert starting.program() == "train.py"
     assert not starting.is_command()  # a process that a command starts has its arguments, but was not started by them

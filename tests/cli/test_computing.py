@@ -194,7 +194,7 @@ def test_a_worker_of_other_code_is_refused():
 
 
 def test_two_places_are_refused_and_a_cluster_needs_its_extra(tmp_path, monkeypatch):
-    parser = Parser("")
+    parser = Parser("", "")
     computing.add(parser)
     args = parser.parse_args(["--workers", "2", "--dask", "tcp://127.0.0.1:1"])
     with pytest.raises(ValueError, match="--workers 2 is of this machine, --dask tcp"), computing.computing(args, None):

@@ -11,7 +11,7 @@ from smo_gym.evaluation.report import tables
 def outcome(small, level, arm, values, failed=None):
     group = study.Group(small, "lqr", level, "", arm, len(values))
     values = np.array(values, dtype=float)
-    metrics = dict.fromkeys(tables.NAMES, values)
+    metrics = dict.fromkeys(tables.metrics.names(), values)
     return study.Outcome(group, metrics, np.zeros(len(values), dtype=bool) if failed is None else np.array(failed))
 
 
