@@ -122,6 +122,8 @@ def test_kills_at_any_moment_lose_nothing(short, wanted, tmp_path):
         except subprocess.TimeoutExpired:
             process.kill()
             process.communicate()
+        if (out / "settings.yaml").exists():
+            break  # the results are whole: what was kept for them may go
         assert known.items() <= stamps(out).items()
         known = stamps(out)
     assert ended(begun([*short, "--workers", "2"], out)) == (0, [])

@@ -14,7 +14,7 @@ FOLDER = ROOT / "notebooks"
 NEEDS = {"03-learning": ("stable_baselines3", "sb3_contrib", "torch")}
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SHORTER = {
-    "03-learning": {"steps = 120_000": "steps = 10_240", "runs = 200": "runs = 20"}
+    "03-learning": {"steps = 120_000": "steps = 12_800", "runs = 200": "runs = 20"}
 }  # all cells run, for less long
 CELL_LIMIT = 300  # s; a kernel that hangs must not hang the tests
 
