@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .kernels.batch import for_slots
+from .kernels.batch import LANES, for_slots
 from .kernels.blocks import ALIVE, FAILED, REWARD, SIGNALS, XD, XHAT, Y0, Block, U, X, Y, address
 from .kernels.driver import drive
 from .typing import Array, Flags
@@ -225,7 +225,10 @@ class Loop:
         positions: Array = _NO_SAMPLES,
     ) -> None:
         """Drive whole control periods; arguments as of :func:`smo_gym.kernels.driver.drive`."""
-        end, cost = begin + periods, _MICROSECONDS_A_STEP * periods * self.substeps
-        told = (begin, end, self.substeps, reference, recording, positions)
-        for start, stop, *program in self._sections:
-            for_slots(drive, start, stop, cost, self.rows, *program, *told)
+        end, substeps, rows = begin + periods, self.substeps, self.rows
+        for start, stop, program, acts, samples in self._sections:
+            told: Any = (rows, program, acts, samples, begin, end, substeps, reference, recording, positions)
+            if stop - start <= LANES:
+                drive(start, stop, *told)
+            else:
+                for_slots(drive, start, stop, _MICROSECONDS_A_STEP * periods * substeps, *told)

@@ -25,8 +25,8 @@ def offsets(*sizes: int) -> tuple[int, ...]:
     return tuple(accumulate(sizes, initial=0))
 
 
-X, Y0, Y, U, XHAT, XD, ALIVE, FAILED, REWARD, SIGNALS = offsets(4, 2, 2, 1, 4, 4, 1, 1, 1)
-"""Rows of what components exchange: the state; the measurement one sample ago and now; the force; the estimate; where
+X, Y0, Y, XHAT, U, XD, ALIVE, FAILED, REWARD, SIGNALS = offsets(4, 2, 2, 4, 1, 4, 1, 1, 1)
+"""Rows of what components exchange: the state; the measurement one sample ago and now; the estimate; the force; where
 the state should be; 1 while a run goes on; 1 from where it fails on; the reward of the last control
 period."""
 

@@ -14,6 +14,7 @@ from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv, VectorObs
 from ..envs.pendulum import PendulumEnv
 from ..envs.task import Task, plain_data
 from ..envs.vector import PendulumVectorEnv
+from ..kernels.blocks import XHAT, Y
 from ..loop import Loop
 from ..observers import OBSERVERS, Estimator, Observer, Oracle, SlidingModeObserver, start_each
 from ..observers.estimator import parts_of
@@ -153,6 +154,11 @@ class Plugged:
     def xhat(self) -> Array:
         """The estimates (4, n), a copy."""
         return self.loop.xhat.copy()
+
+    @property
+    def observed(self) -> Array:
+        """Measurements and estimates, (6, n), a copy."""
+        return self.loop.rows[Y : XHAT + 4].copy()
 
     def reset(self, slots: Flags, y: Array) -> None:
         """Start the marked slots anew, where the loop's encoders are."""
