@@ -141,8 +141,7 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         params, x = self.task.case(self.np_random, asked)
         self.loop.start(_ALL, x[:, None])
         self.loop.own("plant")[PARAMS : PARAMS + 4, 0] = params
-        self._params = params.copy()
-        self._params.flags.writeable = False  # infos share it
+        self._params = params
         self._steps_left = self._steps
         samples = np.repeat(x[None, :2], self._substeps, axis=0)
         self._see(0, 0.0)
@@ -220,7 +219,7 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
     def _info(self, samples: Array, force: float, k: int) -> dict[str, Any]:
         info = {
             "state": self.loop.x[:, 0].copy(),
-            "params": self._params,
+            "params": self._params.copy(),
             "force": force,
             "positions": samples,
             "samples": samples,
