@@ -234,9 +234,9 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
             seeds = [None if seed is None else int(seed) + i for i in range(n)]
         else:
             each = list(seed) if isinstance(seed, Sequence | np.ndarray) else []
-            if len(each) != n or not all(one is None or isinstance(one, numbers.Integral) for one in each):
+            if len(each) != n or not all(s is None or isinstance(s, numbers.Integral) for s in each):
                 raise ValueError(f"seed={short(seed)} must be None, a whole number, or {n} of these, one a slot")
-            seeds = [None if one is None else int(one) for one in each]
+            seeds = [None if s is None else int(s) for s in each]
         fresh = not self._generators
         drawn = [seeding.np_random(s) if fresh or (s is not None and mask[i]) else None for i, s in enumerate(seeds)]
         kept = [None] * n if fresh else list(zip(self._generators, self._seeds, strict=True))

@@ -172,7 +172,7 @@ class Scenario(Settings):
             ImportError: an extra is missing.
         """
         others = list(self.controllers.values())
-        like = next((one for one in others if one.law == "lqr"), others[0])
+        like = next((controller for controller in others if controller.law == "lqr"), others[0])
         settings = PolicySettings.model_construct(law="policy", agent=name, observer=like.observer)
         more = self.model_copy(update={"controllers": {**self.controllers, name: settings}})
         _try_controller(more, name)
@@ -188,14 +188,14 @@ def entered(scenarios: Sequence[Scenario], agent: str) -> tuple[list[Scenario], 
     """
     reasons: dict[str, str] = {}
 
-    def enter(one: Scenario) -> Scenario:
+    def enter(scenario: Scenario) -> Scenario:
         try:
-            return one.with_agent(agent)
+            return scenario.with_agent(agent)
         except ValueError as error:
-            reasons[one.title] = str(error)
-            return one
+            reasons[scenario.title] = str(error)
+            return scenario
 
-    more = [enter(one) for one in scenarios]
+    more = [enter(scenario) for scenario in scenarios]
     if len(reasons) == len(scenarios):
         raise ValueError("; ".join(dict.fromkeys(reasons.values())))
     return more, [f"left out of {title}: {reason}" for title, reason in reasons.items()]

@@ -181,9 +181,11 @@ class DesignSettings(Settings):
 
     def over(self, model: CartPendulum) -> OperatingSet:
         """The operating set; estimated velocities follow an injection of at most m1, and are given a margin more."""
-        one = self.operating_set
-        reach = (1.0 + self.margin.value) ** 2 * math.hypot(*one.speed.value)
-        return OperatingSet(one.theta.value, one.speed.value, (reach, reach), one.uncertainty.value, model)
+        settings = self.operating_set
+        reach = (1.0 + self.margin.value) ** 2 * math.hypot(*settings.speed.value)
+        return OperatingSet(
+            settings.theta.value, settings.speed.value, (reach, reach), settings.uncertainty.value, model
+        )
 
     def build(self, dt: float, model: CartPendulum) -> SlidingModeObserver:
         """The observer, with a step that it is stable at for the declared force.

@@ -48,10 +48,10 @@ def _cost(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
     both = [~(a.failed | b.failed) for a, b in pairs]
 
     def column(name: str) -> tuple[Array, Array]:
-        one, other = (
+        without, compensated = (
             np.concatenate([pair[i].metrics[name][ok] for pair, ok in zip(pairs, both, strict=True)]) for i in (0, 1)
         )
-        return one, other
+        return without, compensated
 
     effort, force, speed = column("effort"), column("peak_force"), column("estimation_rms_h_dot")
     if not effort[0].size:

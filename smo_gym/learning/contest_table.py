@@ -67,8 +67,8 @@ def _steps(row: Row) -> str:
     return f"{steps[0]:,}" if steps and isinstance(steps[0], int) else ""
 
 
-def _span(one: Estimate) -> str:
-    return f"{one.value:.4g}" + ("" if math.isnan(one.low) else f" [{one.low:.4g}, {one.high:.4g}]")
+def _span(estimate: Estimate) -> str:
+    return f"{estimate.value:.4g}" + ("" if math.isnan(estimate.low) else f" [{estimate.low:.4g}, {estimate.high:.4g}]")
 
 
 def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores, Scores]]]]:
@@ -93,7 +93,7 @@ def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores
 def sentence(comparison: Comparison) -> str:
     """A comparison in words."""
     a, b, ratio, probability = comparison.a, comparison.b, comparison.ratio, comparison.probability
-    of_a, of_b = (f"{one.failed.sum()} of {one.failed.size}" for one in (a, b))
+    of_a, of_b = (f"{scores.failed.sum()} of {scores.failed.size}" for scores in (a, b))
 
     def span(low: float, high: float) -> str:
         return "" if math.isnan(low) else f" [{low:.3g}, {high:.3g}]"

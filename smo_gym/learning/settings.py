@@ -126,10 +126,10 @@ def load(
 
 def _seen(wrapper: Any) -> str:
     """The kind of observation that ``env_wrapper`` asks for."""
-    one = wrapper[0] if isinstance(wrapper, list) and len(wrapper) == 1 else None
-    if not isinstance(one, dict) or list(one) != [VIEW]:
+    view = wrapper[0] if isinstance(wrapper, list) and len(wrapper) == 1 else None
+    if not isinstance(view, dict) or list(view) != [VIEW]:
         raise ValueError(f"env_wrapper={wrapper!r} must be a list of {VIEW} with its arguments alone")
-    arguments = mapping("argument of agent_view", one[VIEW], {"observation"})
+    arguments = mapping("argument of agent_view", view[VIEW], {"observation"})
     return choice("observation", arguments.get("observation", "smo"), KINDS)
 
 

@@ -136,7 +136,7 @@ def _table5(controller: str, cases: Sequence[str]) -> list[Any]:
 
 
 def _labels(first: Sequence[str]) -> list[str]:
-    return [f"{one}, {arm}, {state}" for one in first for arm in PRINTED for state in STATES]
+    return [f"{place}, {arm}, {state}" for place in first for arm in PRINTED for state in STATES]
 
 
 class Lqr:
@@ -221,7 +221,7 @@ class Regulation:
         lqr, smc = (self.table4.controllers[name] for name in ("lqr", "smc"))
         assert isinstance(lqr, LqrSettings)
         dt = self.table4.control_period.value
-        smc_observers, lqr_observers = ([one.observer.build(True)] * len(values) for one in (smc, lqr))
+        smc_observers, lqr_observers = ([controller.observer.build(True)] * len(values) for controller in (smc, lqr))
 
         def law(n: int) -> SlidingModeController:
             return SlidingModeController(
