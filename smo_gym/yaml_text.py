@@ -10,11 +10,11 @@ from typing import Any
 import yaml
 
 MOST_CHARACTERS = 1_000_000
-"""Of a file."""
+"""Most characters of a file."""
 MOST_VALUES = 20_000
-"""With what aliases stand for; a text counts one more for every hundred characters."""
+"""Most values of a file, with what aliases stand for; a text counts one more for every hundred characters."""
 MOST_LEVELS = 32
-"""Of values in values."""
+"""Most levels of values in values."""
 
 
 class Unsuitable(ValueError):

@@ -1,4 +1,4 @@
-"""The same environments natively vectorised: one compiled batch, one plant, generator and clock a slot."""
+"""The environments natively vectorised: one compiled batch, one plant, generator and clock a slot."""
 
 from __future__ import annotations
 

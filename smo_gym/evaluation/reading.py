@@ -15,9 +15,9 @@ from . import configs
 
 T = TypeVar("T", bound=BaseModel)
 MOST_FILES = 16
-"""That extend each other."""
+"""Most files that extend each other."""
 MOST_FAULTS = 5
-"""That a message names."""
+"""Most faults that a message names."""
 
 
 def read(path: Path, kind: type[T]) -> T:

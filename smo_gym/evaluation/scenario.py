@@ -41,7 +41,7 @@ from .settings import (
 )
 
 MOST_SUBSTEPS = 10_000
-"""Integration steps in a control period: all of their instants are in memory at once."""
+"""Most integration steps in a control period: all of their instants are in memory at once."""
 __all__ = ["ControllerSettings", "Scenario", "Setting", "TheoremSettings", "entered", "load", "load_theorem", "named"]
 
 
@@ -162,7 +162,7 @@ class Scenario(Settings):
         return value
 
     def with_agent(self, name: str) -> Scenario:
-        """The same with one controller more, on the estimates of LQR's observer (or the first controller's).
+        """The scenario with one controller more, on the estimates of LQR's observer (or the first controller's).
 
         Args:
             name: any for :func:`smo_gym.policies.named.load`, also those that a file may not name.
@@ -205,7 +205,7 @@ def load_theorem(path: Path) -> TheoremSettings:
     """Read and validate the settings of ``smo-gym theorem``.
 
     Raises:
-        ValueError: as :func:`load`.
+        ValueError: the file cannot be read, is no YAML, or has an unknown, missing or bad value, named with its place.
     """
     return reading.read(path, TheoremSettings)
 

@@ -16,7 +16,7 @@ _RESAMPLES = 2000
 
 
 def ceiling(values: Array) -> float:
-    """How probably a mean of ten runs lies within 10 % of it when every setting is exact.
+    """How probably a printed cell, a mean of ten runs, has our mean within 10 % of it when every setting is exact.
 
     Means of ten are drawn with replacement from our runs, and our mean is taken for the true one: measured/published
     is within 10 % of 1. NaN from no more than ten runs, which say too little of their own scatter.

@@ -54,9 +54,9 @@ class Comparison:
     a: Scores
     b: Scores
     ratio: Estimate
-    """Of the means over all levels of the interquartile means, a / b: below 1 where a is the better."""
+    """Ratio a / b of the means over all levels of the interquartile means: below 1 where a is the better."""
     probability: Estimate
-    """That a has the lower score on the same plant, a draw counted half, over all pairs of their policies."""
+    """Probability that a has the lower score on the same plant, a draw counted half, over all pairs of policies."""
 
     @property
     def verdict(self) -> str:
@@ -77,7 +77,7 @@ def widening(seeds: int) -> float:
 
 
 def interquartile_means(scores: Scores) -> list[Estimate]:
-    """At each level, and last over all."""
+    """Interquartile mean of a contender's scores at each level, and last the mean of these over all levels."""
 
     def means(policies: Indices, plants: Indices) -> Array:
         levels = _level_means(scores.values[policies][:, :, plants])

@@ -31,12 +31,12 @@ class Contender:
     controller: str
     observation: str
     names: tuple[str, ...]
-    """Of its policies' weights, or of the controller in the scenario."""
+    """Names of its policies' weights, or of the controller in the scenario."""
     cards: tuple[Card, ...] = ()
 
     @property
     def title(self) -> str:
-        """Such as "PPO on smo"."""
+        """The contender's name in tables, such as "PPO on smo"."""
         return f"{self.controller} on {self.observation}"
 
 
@@ -48,7 +48,7 @@ class Scores:
     values: Array
     """MSE of h in m^2 plus MSE of theta in rad^2, :data:`FAILED` where the run failed, (policies, levels, plants)."""
     failed: Flags
-    """(policies, levels, plants)."""
+    """Which runs failed, (policies, levels, plants)."""
 
 
 def trained(folders: Iterable[Path], environment: str) -> tuple[list[Contender], list[str]]:
@@ -131,7 +131,7 @@ def measure(
     progress: Callable[[float], object] = lambda seconds: None,
     measured: Callable[..., list[study.Outcome]] = study.measure,
 ) -> list[Scores]:
-    """All contenders on the same plants.
+    """Run all contenders on the same plants.
 
     Args:
         scenario: of :func:`entered`.

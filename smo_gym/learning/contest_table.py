@@ -22,7 +22,7 @@ class Row:
 
     scores: Scores
     means: Sequence[Estimate]
-    """At each level, and last over all."""
+    """Interquartile means at each level, and last over all."""
 
 
 def render(rows: Sequence[Row], levels: Sequence[float], form: str) -> str:
@@ -107,7 +107,7 @@ def sentence(comparison: Comparison) -> str:
 
 
 def aggregate_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
-    """One line a contender and level, and one over all levels, where no level stands."""
+    """Interquartile means as CSV: one line a contender and level, and one over all levels, where no level stands."""
     where = ["controller", "observation", "seeds", "uncertainty"]
     header = [*where, "iqm", "ci_low", "ci_high", "runs", "failures", "row"]
 
@@ -124,7 +124,7 @@ def aggregate_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
 
 
 def runs_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
-    """One line a run."""
+    """Scores as CSV, one line a run."""
     header = ["controller", "observation", "seed", "uncertainty", "run", "failed", "score"]
 
     def lines() -> Iterable[list[object]]:

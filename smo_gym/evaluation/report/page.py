@@ -49,7 +49,7 @@ def check(groups: Sequence[Group], path: Path) -> None:
 
 
 def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str, versions: Mapping[str, str]) -> str:
-    """The page.
+    """The report as the text of one HTML file.
 
     Args:
         outcomes: of :func:`smo_gym.evaluation.study.measure`, with traces.
