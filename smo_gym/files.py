@@ -48,7 +48,7 @@ def refuse_pickle(path: Path) -> None:
     """See that no state of an older version lies there, which only unpickling could read.
 
     Raises:
-        ValueError: it does.
+        ValueError: one lies there.
     """
     if path.exists():
         raise ValueError(f"{path}: is of an older version and is not opened, for that could run any code: remove it")
@@ -97,7 +97,8 @@ def claimed(folder: Path, names: Iterable[str] = ()) -> Iterator[Path]:
         names: of files that will be written there.
 
     Raises:
-        ValueError: as :func:`prepare`, or another command is writing there.
+        ValueError: it cannot be made or written to, a folder stands where a file is to be, or another command is
+            writing there.
     """
     prepare(folder, names=names)
     with _locked(folder):
@@ -113,7 +114,7 @@ def write(path: Path, text: str) -> None:
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """The same of any file.
+    """Write a file of bytes as a whole: whoever looks finds the old one or the new one.
 
     Raises:
         OSError: it cannot be written; the file is named.

@@ -199,7 +199,7 @@ def minimum_energy(
 
 @lru_cache(maxsize=8)
 def _trajectory(reference: Reference, dt: float) -> Array:
-    """Many environments of one table follow the same reference."""
+    """A reference's states (4, N + 1), kept: many environments of one table follow the same one."""
     steps = multiple("element", reference.horizon / len(reference.u), "dt", dt)
     loop = Loop(1, 1, {"plant": moving(np.array(reference.params)[:, None], dt)})
     loop.start(slice(None), np.array(reference.x0)[:, None])

@@ -61,11 +61,11 @@ class Suprema:
     """Right-hand sides of the conditions, one entry a row (h, theta)."""
 
     speed: Array
-    """sup |X2|, of (28)."""
+    """sup |X2| of (28) in m/s and rad/s, (2,)."""
     drift: Array
-    """sup |f20(x) - f20(xhat) + f2Delta(x)|, of (30)."""
+    """sup |f20(x) - f20(xhat) + f2Delta(x)| of (30) in m/s^2 and rad/s^2, (2,)."""
     gain: Array
-    """sup |g20(x) - g20(xhat) + g2Delta(x)|, of (31)."""
+    """sup |g20(x) - g20(xhat) + g2Delta(x)| of (31) in 1/kg and 1/(kg m), (2,)."""
 
 
 def suprema(over: OperatingSet) -> Suprema:
@@ -143,13 +143,13 @@ class Condition:
 
     @property
     def literal(self) -> bool:
-        """As printed: the smaller gain against the norm over rows (Euclidean in (28), infinity in (30) and (31))."""
+        """Whether it holds as printed: the smaller gain against a norm over rows (Euclidean in (28), else infinity)."""
         norm = np.linalg.norm(self.supremum) if self.name == "(28)" else self.supremum.max()
         return bool(self.gain.min() > norm)
 
 
 def conditions(gains: Gains, bounds: Suprema) -> list[Condition]:
-    """(28), (30) and (31) for some gains."""
+    """The conditions (28), (30) and (31) for some gains."""
     return [
         Condition("(28)", np.array(gains.m1), bounds.speed),
         Condition("(30)", np.array(gains.beta_1), bounds.drift),

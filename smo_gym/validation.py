@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .typing import Array
 
 MOST = 1e8
-"""Integration steps in a control period, control periods in an episode: more is a slip, not a simulation."""
+"""Most integration steps in a control period, or control periods in an episode: more is a slip, not a simulation."""
 _LONGEST = 200  # characters of a value in a message
 _REPR = reprlib.Repr()
 _REPR.maxlist = _REPR.maxtuple = _REPR.maxdict = 12

@@ -10,11 +10,11 @@ from typing import Any
 import yaml
 
 MOST_CHARACTERS = 1_000_000
-"""Of a file."""
+"""Most characters of a file."""
 MOST_VALUES = 20_000
-"""With what aliases stand for; a text counts one more for every hundred characters."""
+"""Most values of a file, with what aliases stand for; a text counts one more for every hundred characters."""
 MOST_LEVELS = 32
-"""Of values in values."""
+"""Most levels of values in values."""
 
 
 class Unsuitable(ValueError):
@@ -72,8 +72,8 @@ class _Loader(yaml.SafeLoader):
                 if name in keys:
                     raise _error(f"the key {short(key.value)} is given twice", key)
                 keys.add(name)
-            return 1 + sum(self._weights[one] for pair in node.value for one in pair)
-        return 1 + sum(self._weights[one] for one in node.value)
+            return 1 + sum(self._weights[child] for pair in node.value for child in pair)
+        return 1 + sum(self._weights[child] for child in node.value)
 
     def construct_number(self, node: yaml.ScalarNode) -> float:
         """A finite number."""

@@ -44,11 +44,13 @@ def test_along_a_trajectory_the_suprema_are_those_of_its_points():
 def test_designed_gains_satisfy_the_conditions_and_the_printed_ones_do_not():
     bounds = theorem.suprema(SET)
     designed = theorem.conditions(theorem.design(SET), bounds)
-    assert [one.name for one in designed] == ["(28)", "(30)", "(31)"]
-    assert all(one.literal and one.by_row.all() for one in designed)
-    assert not any(one.literal for column in ("lqr", "smc") for one in theorem.conditions(Gains.of(column), bounds))
+    assert [condition.name for condition in designed] == ["(28)", "(30)", "(31)"]
+    assert all(condition.literal and condition.by_row.all() for condition in designed)
+    assert not any(
+        condition.literal for column in ("lqr", "smc") for condition in theorem.conditions(Gains.of(column), bounds)
+    )
     barely = theorem.conditions(theorem.design(SET, margin=1e-9), bounds)
-    assert all(one.literal for one in barely)
+    assert all(condition.literal for condition in barely)
 
 
 def test_the_stable_step_is_the_longest_that_divides_the_sampling_period():

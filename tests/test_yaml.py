@@ -62,7 +62,7 @@ def test_numbers_are_those_of_yaml_1_2(tmp_path):
     path.write_text("[3e-4, 1e6, -1.5E+3, .5, 1., 12, 1_000, 0x1F, lin_3e-4, 1:30, '3e-4', ~, true]")
     found = [0.0003, 1e6, -1500.0, 0.5, 1.0, 12, 1000, 31, "lin_3e-4", "1:30", "3e-4", None, True]
     assert files.read_yaml(path) == found
-    assert [type(one) for one in files.read_yaml(path)] == [type(one) for one in found]
+    assert [type(value) for value in files.read_yaml(path)] == [type(value) for value in found]
 
 
 @pytest.mark.parametrize(
@@ -110,7 +110,7 @@ def test_a_chain_of_files_has_an_end(tmp_path):
 
 
 def test_more_runs_than_can_be_done_are_refused_at_once():
-    one = scenario.named("regulation")
+    table4 = scenario.named("regulation")
     for runs in (10**6, 10**12, 10**400):
         with pytest.raises(ValueError, match=r"runs=.* take fewer runs, levels or initial states"):
-            study.groups([one], ["lqr"], arms.ARMS, runs)
+            study.groups([table4], ["lqr"], arms.ARMS, runs)

@@ -73,8 +73,8 @@ def settings() -> str:
     for path in sorted(ROOT.glob("configs/*.yaml")):
         data = yaml.safe_load(path.read_text(encoding="utf-8"))
         rows = [
-            (f"`{'.'.join(place)}`", f"`{one['value']}`", one["source"], one.get("note", ""))
-            for place, one in _settings(data, ())
+            (f"`{'.'.join(place)}`", f"`{setting['value']}`", setting["source"], setting.get("note", ""))
+            for place, setting in _settings(data, ())
         ]
         if rows:
             table = tabulate(rows, ("setting", "value", "source", "note"), "github", disable_numparse=True)

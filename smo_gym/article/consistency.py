@@ -113,6 +113,6 @@ def _column(table: str, controller: str, metric: str, state: str, arm: str, case
 
 
 def _reduction(table: str, controller: str, metric: str, state: str, case: str | None = None) -> float:
-    """In percent, of the averages over rows."""
+    """The reduction of the average over rows by the compensation, in percent."""
     without, with_ = (np.mean(_column(table, controller, metric, state, arm, case)) for arm in (WITHOUT, WITH))
     return float(100.0 * (1.0 - with_ / without))

@@ -18,7 +18,7 @@ from . import starting
 
 PACKAGES = ("smo_gym", "gymnasium", "numba", "numpy", "scipy")
 DIGITS = 30
-"""Whole numbers beyond are no seeds and no counts; 1e999999999 would fill the memory."""
+"""Most digits of a whole number: more are no seed and no count, and 1e999999999 would fill the memory."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -65,7 +65,7 @@ class _Version(argparse.Action):
 
 
 def versions(packages: Iterable[str] = PACKAGES) -> dict[str, str]:
-    """Of Python and of packages: of this one that of the code that runs, of another "unknown" if not installed.
+    """Versions of Python and packages: of this one that of the code that runs, of another "unknown" if not installed.
 
     Metadata of this package would be wrong of a checkout that has changed since it was installed.
     """

@@ -16,7 +16,7 @@ except ImportError as error:
     raise ImportError('--dask needs distributed: pip install "smo_gym[dask]"') from error
 
 PATIENCE = "10s"
-"""To wait for the scheduler."""
+"""How long to wait for the scheduler."""
 
 
 @contextmanager

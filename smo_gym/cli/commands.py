@@ -21,7 +21,7 @@ COMMANDS = {
     "reference": "the minimum-energy reference of the tracking scenario",
     "animate": "a run as a GIF or WebP",
 }
-"""In a line each."""
+"""What each command does, in a line, by its name."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -24,7 +24,7 @@ OPTIONS = ("workers", "dask")
 """Arguments that say where: no result depends on them, and no file of results names them."""
 AGAIN = "nothing was written; what is done is kept, the same command goes on from there"
 Measure = Callable[..., list[study.Outcome]]
-""":func:`smo_gym.evaluation.study.measure` with its ``map`` and ``store``."""
+"""Measures groups: :func:`smo_gym.evaluation.study.measure` with its ``map`` and ``store`` given."""
 
 
 def add(parser: Parser) -> None:

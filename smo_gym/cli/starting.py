@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 INTERRUPTED = 130
-"""The exit code."""
+"""Exit code of a command that Ctrl-C has ended."""
 SCRIPT, MODULE = "smo-gym", "python -m smo_gym"
 _PACKAGE = Path(__file__).resolve().parents[1]
 

@@ -121,7 +121,7 @@ def parts(
 
 
 def gain_conditions(gains: dict[str, Gains], over: theorem.OperatingSet) -> None:
-    """(28), (30) and (31) for some gains."""
+    """Print whether conditions (28), (30) and (31) hold for some gains over an operating set."""
     bounds = theorem.suprema(over)
     rows = [
         (name, row.name, pair(row.gain), pair(row.supremum), " ".join(map(said, row.by_row)), said(row.literal))
@@ -137,7 +137,7 @@ def gain_conditions(gains: dict[str, Gains], over: theorem.OperatingSet) -> None
 
 
 def runs(found: Convergence, settings: TheoremSettings) -> None:
-    """What the runs showed."""
+    """Print what the runs showed."""
     stayed, total = found.tested, len(found.stayed)
     n, inside = int(stayed.sum()), int(found.kept[stayed].sum())
     bounds = ", ".join(f"{value:.2f}" for value in found.largest)
@@ -218,7 +218,7 @@ def along(article: Scenario, controller: str) -> Traces:
 
 
 def trajectories(article: Scenario, traces: dict[str, Traces]) -> None:
-    """(28), (30) and (31) along runs of Table 5's cases."""
+    """Print what conditions (28), (30) and (31) want along runs of Table 5's cases."""
     rows = []
     for name, runs in traces.items():
         gains = Gains.of(article.controllers[name].observer.gains.value)
@@ -232,7 +232,7 @@ def trajectories(article: Scenario, traces: dict[str, Traces]) -> None:
 
 
 def switching(article: Scenario, traces: Traces) -> None:
-    """(51) and (52) along SMC runs of Table 5's cases on the nominal plant."""
+    """Print whether (51) and (52) hold along SMC runs of Table 5's cases on the nominal plant."""
     law = article.agent("smc")
     assert isinstance(law, SlidingModeController)
     rows = []

@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def table(outcomes: Sequence[study.Outcome], form: str) -> str:
-    """Percentages by start, level and arm, in a format of tabulate."""
+    """Percentages of runs that fell, by start, level and arm, in a format of tabulate."""
     cells: dict[tuple[str, str], dict[str, str]] = {}
     for group, falls, runs, low, high in counts(outcomes):
         text = f"{100 * falls / runs:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
@@ -68,7 +68,7 @@ def table(outcomes: Sequence[study.Outcome], form: str) -> str:
 
 
 def data(outcomes: Sequence[study.Outcome]) -> str:
-    """The same as CSV, fractions in place of percentages."""
+    """Fractions of runs that fell, one line a start, level and arm, as CSV."""
     lines = [
         (group.case, group.uncertainty, group.arm, falls, runs, falls / runs, low, high)
         for group, falls, runs, low, high in counts(outcomes)

@@ -44,7 +44,7 @@ class Feedback:
     _alone: Loop | None = None
 
     def part(self, n: int) -> Part:
-        """What it puts into a loop of n slots.
+        """What the law puts into a loop of n slots.
 
         Raises:
             ValueError: it has gains for another number of slots.

@@ -56,7 +56,7 @@ class LQR(Feedback):
             Q: weights, the diagonal (4,) or a symmetric positive semidefinite (4, 4).
             R: weight of the force, positive; a number or an array of shape (1, 1).
             model: nominal plant, or an environment, whose nominal plant is taken (Table 2 by default).
-            wrap: as of the class.
+            wrap: take the error of the angle within half a turn.
 
         Raises:
             ValueError: a weight is not allowed, or under these weights no gain makes x = 0 asymptotically stable.
@@ -79,7 +79,7 @@ class LQR(Feedback):
         return cls(K, wrap)
 
     def part(self, n: int) -> Part:
-        """What it puts into a loop of n slots.
+        """What the law puts into a loop of n slots.
 
         Raises:
             ValueError: K has another number of slots.

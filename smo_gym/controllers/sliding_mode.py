@@ -88,7 +88,7 @@ class SlidingModeController(Feedback):
         self._gains = np.atleast_2d(np.concatenate(rows, axis=-1))
 
     def part(self, n: int) -> Part:
-        """What it puts into a loop of n slots.
+        """What the law puts into a loop of n slots.
 
         Raises:
             ValueError: k has another number of slots.

@@ -36,15 +36,15 @@ class Scene:
     """What there is to see at one instant."""
 
     time: float
-    """s."""
+    """Time since the episode's start in s."""
     position: Array
-    """h in m and theta in rad, then whatever else, (2 or more,)."""
+    """h in m and theta in rad, then whatever else the state has, (2 or more,)."""
     rod: float
-    """Length of this episode's rod, m."""
+    """Length of this episode's rod in m."""
     force: float
-    """That the actuator applied until now, N."""
+    """Force in N that the actuator applied until now."""
     desired: Array | None
-    """Where h and theta should be, (2 or more,)."""
+    """Where h in m and theta in rad should be, (2 or more,); None without a reference."""
 
 
 def bob(task: Task, position: Array, rod: float) -> Point:

@@ -1,8 +1,7 @@
-"""The same environments natively vectorised: one compiled batch, one plant, generator and clock a slot."""
+"""The environments natively vectorised: one compiled batch, one plant, generator and clock a slot."""
 
 from __future__ import annotations
 
-import numbers
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -22,6 +21,7 @@ from ..validation import mapping, short, whole
 from .desired import Desired
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .rendering import Renderer, Scene
+from .resetting import instants, marked, seeds_of, slot_by_slot
 from .spec import Specified
 from .stepping import checked_force, loop_of
 from .task import Task
@@ -116,11 +116,11 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
                 at most those of the horizon, so that slots need not end together. Later episodes have the horizon.
         """
         options = mapping("reset option", options or {}, (*RESET_OPTIONS, "reset_mask", "steps"))
-        mask = self._mask(options.pop("reset_mask", self._everywhere))
+        mask = marked(options.pop("reset_mask", self._everywhere), self.num_envs)
         if not self._generators and not mask.all():
             raise ResetNeeded("no episode has begun: the first reset() must be of all slots")
-        cut = self._instants(options.pop("steps", self.task.steps))
-        asked = [self.task.asked(each) for each in self._each(options)]
+        cut = instants(options.pop("steps", self.task.steps), self.num_envs, self.task.steps)
+        asked = [self.task.asked(of_slot) for of_slot in slot_by_slot(options, self.num_envs)]
         self._seed(seed, mask)
         self._start(mask, asked)
         self._cut[mask] = cut[mask]
@@ -214,29 +214,8 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self._truncated |= slots & ~self._terminated
         self._waiting = True
 
-    def _mask(self, mask: Any) -> Flags:
-        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise ValueError(f"options['reset_mask']={mask!r} must be a boolean array of shape ({self.num_envs},)")
-        if not mask.any():
-            raise ValueError("options['reset_mask'] must mark at least one slot")
-        return mask
-
-    def _instants(self, steps: Any) -> NDArray[np.int64]:
-        given, n, most = np.asarray(steps), self.num_envs, self.task.steps
-        whole = given.dtype.kind in "iu" and given.shape in ((), (n,))
-        if not whole or given.min() < 1 or given.max() > most:
-            raise ValueError(f"options['steps']={steps!r} must be a whole number from 1 to {most}, or {n} such numbers")
-        return np.broadcast_to(given, n).astype(np.int64)
-
     def _seed(self, seed: int | Sequence[int | None] | None, mask: Flags) -> None:
-        n = self.num_envs
-        if seed is None or isinstance(seed, numbers.Integral):
-            seeds = [None if seed is None else int(seed) + i for i in range(n)]
-        else:
-            each = list(seed) if isinstance(seed, Sequence | np.ndarray) else []
-            if len(each) != n or not all(one is None or isinstance(one, numbers.Integral) for one in each):
-                raise ValueError(f"seed={short(seed)} must be None, a whole number, or {n} of these, one a slot")
-            seeds = [None if one is None else int(one) for one in each]
+        n, seeds = self.num_envs, seeds_of(seed, self.num_envs)
         fresh = not self._generators
         drawn = [seeding.np_random(s) if fresh or (s is not None and mask[i]) else None for i, s in enumerate(seeds)]
         kept = [None] * n if fresh else list(zip(self._generators, self._seeds, strict=True))
@@ -253,14 +232,6 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self._params_told.flags.writeable = False  # infos share it
         self._k[mask], self._cut[mask] = 0, self.task.steps
         self._terminated[mask] = self._truncated[mask] = False
-
-    def _each(self, options: dict[str, Any]) -> list[dict[str, Any]]:
-        """Options slot by slot: an array with a leading axis of slots is taken apart, anything else is for all."""
-        n = self.num_envs
-        return [
-            {name: value[i] if np.shape(value) == (n, 4) else value for name, value in options.items()}
-            for i in range(n if options else 0)
-        ]
 
     def _still(self) -> Array:
         """Samples (substeps, 2, n) of plants that have not moved."""

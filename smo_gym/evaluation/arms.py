@@ -29,13 +29,13 @@ _NAME, _COLOUR = re.compile(r"\w[\w-]*"), re.compile(r"#[0-9A-Fa-f]{6}")
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """One arm.
+    """An arm of a comparison: which observer's estimate its runs are on, and how it is shown.
 
     Args:
         name: in files, tables and on the command line: letters, digits, "-" and "_".
         title: in figures and the report.
         colour: in the report, as "#RRGGBB".
-        colour_on_dark: the same on dark ground.
+        colour_on_dark: in the report on dark ground, as "#RRGGBB".
         observer: makes its observer.
         designed: it works from the scenario's setting ``designed``: that must be there and hold all levels of
             uncertainty, and runs that leave its operating set are counted.
@@ -59,7 +59,7 @@ class Arm:
                 raise ValueError(f"{colour}={getattr(self, colour)!r} must be as '#RRGGBB'")
 
     def check(self, scenario: Scenario) -> None:
-        """See that it can run in a scenario.
+        """See that the arm can run in a scenario.
 
         Raises:
             ValueError: it needs designed gains, and the scenario says nothing of them or has larger levels.
@@ -74,7 +74,7 @@ class Arm:
             )
 
     def tried(self, settings: ObserverSettings, scenario: Scenario, env: VectorEnv[Array, Array, Array]) -> Observer:
-        """Its observer, after a start in an environment of the scenario's.
+        """The arm's observer, after a start in an environment of the scenario's.
 
         Raises:
             ValueError: it cannot be made, or cannot work there.

@@ -8,19 +8,19 @@ from ..validation import choice
 
 
 def folder() -> Path:
-    """Where they are: inside an installed package, beside the package in a checkout."""
+    """The folder of these files: inside an installed package, beside the package in a checkout."""
     package = Path(__file__).resolve().parents[1]
     inside = package / "configs"
     return inside if inside.is_dir() else package.parent / "configs"
 
 
 def names() -> list[str]:
-    """What there is: regulation, tracking and others."""
+    """Names of the files of settings: regulation, tracking and others."""
     return sorted(path.stem for path in folder().glob("*.yaml"))
 
 
 def path(name: str) -> Path:
-    """The file of one by its name.
+    """The file of settings of a name.
 
     Raises:
         ValueError: there is none of this name.

@@ -41,7 +41,7 @@ def escaped(text: str, form: str) -> str:
 
 
 def heading(text: str, form: str, level: int = 2) -> str:
-    """A heading."""
+    """A text as a heading in a format of tabulate."""
     shown = escaped(text, form)
     if form == "github":
         return f"{'#' * level} {shown}"
@@ -51,7 +51,7 @@ def heading(text: str, form: str, level: int = 2) -> str:
 
 
 def table(form: str, header: Sequence[str], rows: Iterable[Sequence[str]], align: Sequence[str] | None = None) -> str:
-    """A table of texts."""
+    """Rows of texts as a table in a format of tabulate."""
     own = line if form.startswith("latex") else lambda text: escaped(text, form)  # tabulate itself escapes for LaTeX
     lines = [[own(text) for text in row] for row in rows]
     return tabulate(lines, [own(text) for text in header], tablefmt=form, disable_numparse=True, colalign=align)

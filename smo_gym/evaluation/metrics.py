@@ -21,7 +21,7 @@ from ..typing import Array
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One number of a run."""
+    """A number that each run gives: its name, unit and description."""
 
     name: str
     unit: str
@@ -49,7 +49,7 @@ class Meter:
     close: Block | None = None
 
     def part(self, n: int) -> Part:
-        """What it puts into a loop of n slots."""
+        """What the meter puts into a loop of n slots."""
         return Part(columns(n, np.zeros(self.rows)), sample=self.sample, close=self.close)
 
 
@@ -84,7 +84,7 @@ def peak(own: Array, row: int, i: int, value: float, going: bool) -> None:
 
 @inlined
 def peak_or_nan(own: Array, row: int, i: int, value: float, going: bool) -> None:
-    """As :func:`peak`, and what is not a number is kept."""
+    """Keep the largest magnitude, in runs that go on, and NaN once there was one."""
     size, before = abs(value), own[row * LANES + i]
     own[row * LANES + i] = size if going and not (size <= before) else before
 
@@ -172,7 +172,7 @@ METERS: dict[str, Meter] = {USUAL.name: USUAL}
 
 
 def register(meter: Meter) -> None:
-    """Measure more, from now on.
+    """Add a meter, whose metrics are measured from now on.
 
     Raises:
         ValueError: its name or that of a metric is taken.

@@ -15,9 +15,9 @@ from . import configs
 
 T = TypeVar("T", bound=BaseModel)
 MOST_FILES = 16
-"""That extend each other."""
+"""Most files that extend each other."""
 MOST_FAULTS = 5
-"""That a message names."""
+"""Most faults that a message names."""
 
 
 def read(path: Path, kind: type[T]) -> T:
@@ -89,7 +89,7 @@ def _explain(error: Any, kind: type[BaseModel]) -> str:
     if error["type"] == "extra_forbidden":
         return start + unknown("setting", place[-1], _fields(place[:-1], kind))
     message = error["msg"].removeprefix("Value error, ")
-    for value in filter(lambda one: isinstance(one, str), error.get("ctx", {}).values()):
+    for value in filter(lambda value: isinstance(value, str), error.get("ctx", {}).values()):
         message = message.replace(value, files.shortened(value, 60))
     given = f" (given {short(error['input'])})" if place and error["type"] != "missing" else ""
     return f"{start}{message}{given}"

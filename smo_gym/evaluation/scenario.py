@@ -41,7 +41,7 @@ from .settings import (
 )
 
 MOST_SUBSTEPS = 10_000
-"""Integration steps in a control period: all of their instants are in memory at once."""
+"""Most integration steps in a control period: all of their instants are in memory at once."""
 __all__ = ["ControllerSettings", "Scenario", "Setting", "TheoremSettings", "entered", "load", "load_theorem", "named"]
 
 
@@ -162,7 +162,7 @@ class Scenario(Settings):
         return value
 
     def with_agent(self, name: str) -> Scenario:
-        """The same with one controller more, on the estimates of LQR's observer (or the first controller's).
+        """The scenario with one controller more, on the estimates of LQR's observer (or the first controller's).
 
         Args:
             name: any for :func:`smo_gym.policies.named.load`, also those that a file may not name.
@@ -172,7 +172,7 @@ class Scenario(Settings):
             ImportError: an extra is missing.
         """
         others = list(self.controllers.values())
-        like = next((one for one in others if one.law == "lqr"), others[0])
+        like = next((controller for controller in others if controller.law == "lqr"), others[0])
         settings = PolicySettings.model_construct(law="policy", agent=name, observer=like.observer)
         more = self.model_copy(update={"controllers": {**self.controllers, name: settings}})
         _try_controller(more, name)
@@ -188,14 +188,14 @@ def entered(scenarios: Sequence[Scenario], agent: str) -> tuple[list[Scenario], 
     """
     reasons: dict[str, str] = {}
 
-    def enter(one: Scenario) -> Scenario:
+    def enter(scenario: Scenario) -> Scenario:
         try:
-            return one.with_agent(agent)
+            return scenario.with_agent(agent)
         except ValueError as error:
-            reasons[one.title] = str(error)
-            return one
+            reasons[scenario.title] = str(error)
+            return scenario
 
-    more = [enter(one) for one in scenarios]
+    more = [enter(scenario) for scenario in scenarios]
     if len(reasons) == len(scenarios):
         raise ValueError("; ".join(dict.fromkeys(reasons.values())))
     return more, [f"left out of {title}: {reason}" for title, reason in reasons.items()]
@@ -205,7 +205,7 @@ def load_theorem(path: Path) -> TheoremSettings:
     """Read and validate the settings of ``smo-gym theorem``.
 
     Raises:
-        ValueError: as :func:`load`.
+        ValueError: the file cannot be read, is no YAML, or has an unknown, missing or bad value, named with its place.
     """
     return reading.read(path, TheoremSettings)
 

@@ -18,23 +18,23 @@ T = TypeVar("T")
 Four = tuple[float, float, float, float]
 Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
 State = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
-"""m, rad, m/s, rad/s."""
+"""A state [h, theta, h', theta'] in m, rad, m/s, rad/s."""
 Fraction = Annotated[float, Field(ge=0.0, lt=1.0)]
 Name = Annotated[str, Field(max_length=200)]
 Horizon = Annotated[float, Field(le=1e5)]
-"""s; a day and more."""
+"""Length of a run in s, a day and more at most."""
 LONGEST_PERIOD = 10.0
-"""s; all instants of one control period are in memory at once."""
+"""Longest control period in s: all of its instants are in memory at once."""
 Period = Annotated[float, Field(le=LONGEST_PERIOD)]
 
 
 SHORTEST_STEP = 1e-6
-"""s, of an observer."""
+"""Shortest integration step of an observer in s."""
 Step = Annotated[float, Field(ge=SHORTEST_STEP)]
 
 
 class Strict(BaseModel):
-    """Unknown names and numbers that are not finite are refused."""
+    """Settings that refuse unknown names and numbers that are not finite."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -66,7 +66,7 @@ class Settings(Strict):
     """Settings that belong together, and names."""
 
     def changed(self, *, note: str = "", **values: Any) -> Self:
-        """The same with other values, chosen ones, checked as if a file had given them.
+        """These settings with other values, chosen ones, checked as if a file had given them.
 
         Args:
             note: of the settings that change.
@@ -86,7 +86,7 @@ class Settings(Strict):
 
 
 class ObserverSettings(Settings):
-    """The sliding mode observer that a controller's tables were made with; see there for the units."""
+    """The sliding mode observer that a controller's tables were made with, its units as there."""
 
     gains: Setting[str | dict[str, tuple[float, float]]]
     slopes: Setting[tuple[float, float]]
@@ -107,7 +107,7 @@ class ObserverSettings(Settings):
 
 
 class LqrSettings(Settings):
-    """u = -K xhat."""
+    """Settings of LQR, u = -K xhat."""
 
     law: Literal["lqr"]
     K: Setting[Four]
@@ -115,12 +115,12 @@ class LqrSettings(Settings):
     observer: ObserverSettings
 
     def build(self, dt: float) -> LQR:
-        """The controller."""
+        """The controller that these settings make."""
         return LQR(self.K.value, self.wrap.value)
 
 
 class SmcSettings(Settings):
-    """Equations (49)-(50)."""
+    """Settings of the sliding mode control, equations (49)-(50)."""
 
     law: Literal["smc"]
     k: Setting[Four]
@@ -132,7 +132,7 @@ class SmcSettings(Settings):
     observer: ObserverSettings
 
     def build(self, dt: float) -> SlidingModeController:
-        """The controller for a control period of ``dt`` seconds."""
+        """The controller that these settings make for a control period of ``dt`` seconds."""
         return SlidingModeController(
             self.k.value, dt, self.slope.value, self.Z0.value, self.lam.value, self.epsilon.value, self.wrap.value
         )
@@ -181,9 +181,11 @@ class DesignSettings(Settings):
 
     def over(self, model: CartPendulum) -> OperatingSet:
         """The operating set; estimated velocities follow an injection of at most m1, and are given a margin more."""
-        one = self.operating_set
-        reach = (1.0 + self.margin.value) ** 2 * math.hypot(*one.speed.value)
-        return OperatingSet(one.theta.value, one.speed.value, (reach, reach), one.uncertainty.value, model)
+        settings = self.operating_set
+        reach = (1.0 + self.margin.value) ** 2 * math.hypot(*settings.speed.value)
+        return OperatingSet(
+            settings.theta.value, settings.speed.value, (reach, reach), settings.uncertainty.value, model
+        )
 
     def build(self, dt: float, model: CartPendulum) -> SlidingModeObserver:
         """The observer, with a step that it is stable at for the declared force.
@@ -239,7 +241,7 @@ def _for_a_task(options: dict[str, Setting[Any]]) -> dict[str, Setting[Any]]:
 
 
 OptionSettings = Annotated[dict[Name, Setting[Any]], AfterValidator(_for_a_task)]
-"""Options of the environment by name."""
+"""Further options of the environment, by name."""
 
 
 class ReferenceSettings(Settings):

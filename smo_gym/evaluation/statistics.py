@@ -29,9 +29,9 @@ class Result:
     runs: int
     failures: int
     half_width: float = math.nan
-    """Of the 95 % prediction interval around ``measured`` for a mean of ten further runs, which a printed cell is."""
+    """Half-width of the 95 % prediction interval around ``measured`` for a mean of ten further runs: a printed cell."""
     ceiling: float = math.nan
-    """How probably such a mean lies within 10 % of ``measured``."""
+    """How probably a mean of ten further runs lies within 10 % of ``measured``."""
 
     @property
     def deviation(self) -> float:

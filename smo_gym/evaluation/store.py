@@ -29,7 +29,7 @@ from .study import Group, Outcome
 from .traces import Traces
 
 FOLDER = ".groups"
-"""Inside of the folder for results."""
+"""Name of the store's folder, inside of the folder for results."""
 SUFFIX = ".group"
 PACKAGE = Path(__file__).resolve().parents[1]
 COMPUTES = (gymnasium, numba, np, safetensors, scipy)

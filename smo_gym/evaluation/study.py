@@ -25,10 +25,10 @@ from .scenario import ControllerSettings, Scenario
 from .traces import Traces
 
 TRACED_RUNS = 10
-"""Of each group at most so many runs are traced, the first ones: as many as the article shows."""
+"""Most runs of a group that are traced, the first ones: as many as the article shows."""
 MOST_RUNS = 10_000_000
 MOST_SECONDS = 1_000_000_000
-"""Simulated: days of computing."""
+"""Most simulated seconds of a study, over all runs: days of computing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Group:
 
     @property
     def settings(self) -> ControllerSettings:
-        """Of its controller."""
+        """The settings of its controller."""
         return self.scenario.controllers[self.controller]
 
 
@@ -62,13 +62,13 @@ class Outcome:
 
     group: Group
     metrics: dict[str, Array]
-    """Metric name to values (runs,)."""
+    """Values (runs,) by the metric's name."""
     failed: Flags
-    """(runs,)."""
+    """Which runs failed, (runs,)."""
     traces: Traces | None = None
-    """Of its first :data:`TRACED_RUNS` runs, where :func:`measure` was asked for them."""
+    """Traces of the first :data:`TRACED_RUNS` runs, where :func:`measure` was asked for them."""
     plants: Array | None = None
-    """[M_c, m, l, g] of these runs, (runs, 4)."""
+    """The runs' plants [M_c, m, l, g] in kg, kg, m and m/s^2, (runs, 4)."""
 
     @property
     def left(self) -> Flags | None:
@@ -127,10 +127,10 @@ class Piece:
     """Groups that run as one batch, wherever that is."""
 
     indices: tuple[int, ...]
-    """Of its groups among all."""
+    """Where its groups stand among all groups of the study."""
     groups: tuple[Group, ...]
     options: dict[str, Any]
-    """Of their environment."""
+    """Options of the environment that its groups share."""
     seed: int
     samples: int | None
 

@@ -34,25 +34,25 @@ class Convergence:
     stayed: Flags
     """Runs that were inside the operating set throughout, (n,)."""
     promised: Array
-    """t0 of (43) for h and theta in s, (2, n)."""
+    """Time t0 of (43) for the errors of h and theta in s, (2, n)."""
     reached: Array
     """When each position error came into its layer for good, in s, (2, n)."""
     promised_velocity: Array
-    """t1 of (48) in s, (2, n)."""
+    """Time t1 of (48) for the errors of h' and theta' in s, (2, n)."""
     velocity_error: Array
-    """Largest |velocity error| after t1, (2, n)."""
+    """Largest errors of h' in m/s and theta' in rad/s after t1, (2, n)."""
     bounded: Flags
     """Whether each position error kept :func:`smo_gym.theorem.position_bound`, for each of SHARES, (3, 2, n)."""
     velocity_bound: Array
-    """What the velocity errors come below in the end, :func:`smo_gym.theorem.velocity_bound`, (2,)."""
+    """What the errors of h' in m/s and theta' in rad/s come below in the end, by ``theorem.velocity_bound``, (2,)."""
     velocity_settled: Array
-    """Largest |velocity error| after the settling time, (2, n)."""
+    """Largest errors of h' in m/s and theta' in rad/s after the settling time, (2, n)."""
     velocity_rms: dict[str, Array]
-    """RMS errors of h' and theta' over all runs that stayed, after the settling time, observer by observer, (2,)."""
+    """RMS errors of h' in m/s and theta' in rad/s after the settling time, over runs that stayed; (2,) by observer."""
     largest: Array
-    """Largest |theta|, |h'|, |theta'|, their estimates and |u| over all runs, (7,)."""
+    """Largest |theta|, |h'|, |theta'|, their estimates and |u| over all runs in rad, m/s, rad/s and N, (7,)."""
     horizon: float
-    """Of the runs in s: what was promised for later was not tested."""
+    """Length of the runs in s: what was promised for later was not tested."""
 
     @property
     def tested(self) -> Flags:

@@ -53,21 +53,21 @@ class Traces:
     """Some slots of a rollout at every so many control instants, the start included."""
 
     time: Array
-    """s, (m,)."""
+    """The control instants in s, (m,)."""
     x: Array
-    """True states, (m, 4, n)."""
+    """True states [h, theta, h', theta'] in m, rad, m/s, rad/s, (m, 4, n)."""
     xhat: Array
-    """Estimates, (m, 4, n); NaN where the environment has no observer."""
+    """Estimates of the states, in the same units, (m, 4, n); NaN where the environment has no observer."""
     u: Array
     """Force in N over the control period that ended at ``time``, (m, n)."""
     u_low: Array
     """The least force in N since the instant before, (m, n): a force can chatter faster than what is kept of it."""
     u_high: Array
-    """The largest, (m, n)."""
+    """The largest force in N since the instant before, (m, n)."""
     u_mean: Array
-    """The mean, (m, n): what such a force does to the cart."""
+    """The mean force in N since the instant before, (m, n): what a force that chatters does to the cart."""
     x_d: Array | None
-    """The reference, (m, 4), where there is one."""
+    """The reference x_d in m, rad, m/s, rad/s, (m, 4); None where there is none."""
 
 
 LOW, HIGH, SUM, COUNT, _ = offsets(1, 1, 1, 1)
@@ -102,7 +102,7 @@ class Tracer:
         self._rows: list[tuple[Array, ...]] = []
 
     def look(self, k: int, loop: Loop) -> None:
-        """Keep an instant."""
+        """Keep what the loop shows at control instant k."""
         mine, time = self._slots, np.array(k * self._task.control_period)
         u = loop.u[mine].copy()
         low, high, mean = u, u, u
@@ -115,7 +115,7 @@ class Tracer:
         self._rows.append((time, loop.x[:, mine].copy(), loop.xhat[:, mine].copy(), u, low, high, mean))
 
     def traces(self) -> Traces:
-        """What was kept."""
+        """All that was kept, instant by instant."""
         time, x, xhat, u, low, high, mean = (np.array(column) for column in zip(*self._rows, strict=True))
         reference = self._task.reference
         told = None if reference is None else Desired(self._task, reference).states[:: self.every][: len(time)]

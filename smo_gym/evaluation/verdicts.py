@@ -16,7 +16,7 @@ _RESAMPLES = 2000
 
 
 def ceiling(values: Array) -> float:
-    """How probably a mean of ten runs lies within 10 % of it when every setting is exact.
+    """How probably a printed cell, a mean of ten runs, has our mean within 10 % of it when every setting is exact.
 
     Means of ten are drawn with replacement from our runs, and our mean is taken for the true one: measured/published
     is within 10 % of 1. NaN from no more than ten runs, which say too little of their own scatter.
@@ -48,10 +48,10 @@ def _cost(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
     both = [~(a.failed | b.failed) for a, b in pairs]
 
     def column(name: str) -> tuple[Array, Array]:
-        one, other = (
+        without, compensated = (
             np.concatenate([pair[i].metrics[name][ok] for pair, ok in zip(pairs, both, strict=True)]) for i in (0, 1)
         )
-        return one, other
+        return without, compensated
 
     effort, force, speed = column("effort"), column("peak_force"), column("estimation_rms_h_dot")
     if not effort[0].size:

@@ -54,14 +54,14 @@ class Comparison:
     a: Scores
     b: Scores
     ratio: Estimate
-    """Of the means over all levels of the interquartile means, a / b: below 1 where a is the better."""
+    """Ratio a / b of the means over all levels of the interquartile means: below 1 where a is the better."""
     probability: Estimate
-    """That a has the lower score on the same plant, a draw counted half, over all pairs of their policies."""
+    """Probability that a has the lower score on the same plant, a draw counted half, over all pairs of policies."""
 
     @property
     def verdict(self) -> str:
         """The answer to whether a beats b."""
-        if any(one.contender.cards and len(one.values) < SEEDS for one in (self.a, self.b)):
+        if any(scores.contender.cards and len(scores.values) < SEEDS for scores in (self.a, self.b)):
             return "open: a verdict needs five training seeds"
         if math.isnan(self.ratio.low):
             return "open: an interval needs at least two plants a level"
@@ -77,14 +77,14 @@ def widening(seeds: int) -> float:
 
 
 def interquartile_means(scores: Scores) -> list[Estimate]:
-    """At each level, and last over all."""
+    """Interquartile mean of a contender's scores at each level, and last the mean of these over all levels."""
 
     def means(policies: Indices, plants: Indices) -> Array:
         levels = _level_means(scores.values[policies][:, :, plants])
         return np.array([*levels, levels.mean()])
 
     policies, _, plants = scores.values.shape
-    return [_wider(one, scores) for one in _estimates(means, [policies, plants], _few(scores))]
+    return [_wider(estimate, scores) for estimate in _estimates(means, [policies, plants], _few(scores))]
 
 
 def compare(a: Scores, b: Scores) -> Comparison:
@@ -110,16 +110,18 @@ def _few(scores: Scores) -> bool:
     return bool(scores.contender.cards) and len(scores.values) < 2
 
 
-def _wider(one: Estimate, *scores: Scores, within_one: bool = False) -> Estimate:
+def _wider(estimate: Estimate, *scores: Scores, within_one: bool = False) -> Estimate:
     """An interval for the fewest seeds that anything in it was learned from."""
     seeds = [len(each.values) for each in scores if each.contender.cards]
-    if not seeds or math.isnan(one.low):
-        return one
+    if not seeds or math.isnan(estimate.low):
+        return estimate
     factor = widening(min(seeds))
     if within_one:
-        low, high = (one.value + factor * (end - one.value) for end in (one.low, one.high))
-        return Estimate(one.value, max(low, 0.0), min(high, 1.0))
-    return Estimate(one.value, *(one.value * (end / one.value) ** factor for end in (one.low, one.high)))
+        low, high = (estimate.value + factor * (end - estimate.value) for end in (estimate.low, estimate.high))
+        return Estimate(estimate.value, max(low, 0.0), min(high, 1.0))
+    return Estimate(
+        estimate.value, *(estimate.value * (end / estimate.value) ** factor for end in (estimate.low, estimate.high))
+    )
 
 
 def _estimates(function: Callable[..., Array], sizes: Sequence[int], few: bool) -> list[Estimate]:

@@ -31,12 +31,12 @@ class Contender:
     controller: str
     observation: str
     names: tuple[str, ...]
-    """Of its policies' weights, or of the controller in the scenario."""
+    """Names of its policies' weights, or of the controller in the scenario."""
     cards: tuple[Card, ...] = ()
 
     @property
     def title(self) -> str:
-        """Such as "PPO on smo"."""
+        """The contender's name in tables, such as "PPO on smo"."""
         return f"{self.controller} on {self.observation}"
 
 
@@ -48,7 +48,7 @@ class Scores:
     values: Array
     """MSE of h in m^2 plus MSE of theta in rad^2, :data:`FAILED` where the run failed, (policies, levels, plants)."""
     failed: Flags
-    """(policies, levels, plants)."""
+    """Which runs failed, (policies, levels, plants)."""
 
 
 def trained(folders: Iterable[Path], environment: str) -> tuple[list[Contender], list[str]]:
@@ -90,7 +90,7 @@ def _alike(path: Path, card: Card, seeds: dict[int, tuple[str, Card]]) -> None:
     for seed, (other, known) in seeds.items():
         if seed == card.seed:
             raise ValueError(f"{path} and {other} have the same seed, {seed}")
-        here, there = ({k: v for k, v in one.configuration.items() if k != "seed"} for one in (card, known))
+        here, there = ({k: v for k, v in either.configuration.items() if k != "seed"} for either in (card, known))
         if here != there:
             names = [name for name in here | there if here.get(name) != there.get(name)]
             raise ValueError(f"{path} and {other} differ in more than their seed: in {', '.join(names)}")
@@ -131,7 +131,7 @@ def measure(
     progress: Callable[[float], object] = lambda seconds: None,
     measured: Callable[..., list[study.Outcome]] = study.measure,
 ) -> list[Scores]:
-    """All contenders on the same plants.
+    """Run all contenders on the same plants.
 
     Args:
         scenario: of :func:`entered`.
@@ -142,7 +142,7 @@ def measure(
         measured: that function, or one like it that runs the groups elsewhere.
     """
     wanted = [groups(scenario, contender, runs) for contender in contenders]
-    outcomes = iter(measured([group for one in wanted for group in one], seed, progress))
+    outcomes = iter(measured([group for part in wanted for group in part], seed, progress))
     found = []
     for contender, part in zip(contenders, wanted, strict=True):
         rows: list[Any] = [next(outcomes) for _ in part]

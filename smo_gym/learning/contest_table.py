@@ -22,7 +22,7 @@ class Row:
 
     scores: Scores
     means: Sequence[Estimate]
-    """At each level, and last over all."""
+    """Interquartile means at each level, and last over all."""
 
 
 def render(rows: Sequence[Row], levels: Sequence[float], form: str) -> str:
@@ -67,8 +67,8 @@ def _steps(row: Row) -> str:
     return f"{steps[0]:,}" if steps and isinstance(steps[0], int) else ""
 
 
-def _span(one: Estimate) -> str:
-    return f"{one.value:.4g}" + ("" if math.isnan(one.low) else f" [{one.low:.4g}, {one.high:.4g}]")
+def _span(estimate: Estimate) -> str:
+    return f"{estimate.value:.4g}" + ("" if math.isnan(estimate.low) else f" [{estimate.low:.4g}, {estimate.high:.4g}]")
 
 
 def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores, Scores]]]]:
@@ -93,7 +93,7 @@ def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores
 def sentence(comparison: Comparison) -> str:
     """A comparison in words."""
     a, b, ratio, probability = comparison.a, comparison.b, comparison.ratio, comparison.probability
-    of_a, of_b = (f"{one.failed.sum()} of {one.failed.size}" for one in (a, b))
+    of_a, of_b = (f"{scores.failed.sum()} of {scores.failed.size}" for scores in (a, b))
 
     def span(low: float, high: float) -> str:
         return "" if math.isnan(low) else f" [{low:.3g}, {high:.3g}]"
@@ -107,7 +107,7 @@ def sentence(comparison: Comparison) -> str:
 
 
 def aggregate_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
-    """One line a contender and level, and one over all levels, where no level stands."""
+    """Interquartile means as CSV: one line a contender and level, and one over all levels, where no level stands."""
     where = ["controller", "observation", "seeds", "uncertainty"]
     header = [*where, "iqm", "ci_low", "ci_high", "runs", "failures", "row"]
 
@@ -124,7 +124,7 @@ def aggregate_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
 
 
 def runs_csv(rows: Sequence[Row], levels: Sequence[float]) -> str:
-    """One line a run."""
+    """Scores as CSV, one line a run."""
     header = ["controller", "observation", "seed", "uncertainty", "run", "failed", "score"]
 
     def lines() -> Iterable[list[object]]:

@@ -98,7 +98,7 @@ class SB3VecEnv(VecEnv):
         return [wrapped for _ in self._get_indices(indices)]
 
     def _get_indices(self, indices: int | Iterable[int] | None) -> Iterable[int]:
-        """As the base class, which takes NumPy's integers for lists."""
+        """The slots asked for; the base class takes NumPy's integers for lists."""
         return super()._get_indices(int(indices) if isinstance(indices, np.integer) else indices)
 
     def _all(self, call: str, indices: int | Iterable[int] | None) -> None:

@@ -37,7 +37,7 @@ AT_MOST = {"gamma": 1.0, "gae_lambda": 1.0} | dict.fromkeys(
 )
 """Hyperparameters that are numbers from 0 to this; the algorithms take any, and learn nothing from a wrong one."""
 OFF = ("clip_range_vf", "target_kl")
-"""Those of them that may be null."""
+"""Hyperparameters that may be null."""
 
 
 @dataclass(frozen=True)
@@ -51,16 +51,16 @@ class Run:
     steps: int
     n_envs: int
     options: dict[str, Any]
-    """Of the environment."""
+    """Options of the environment."""
     hyperparameters: dict[str, Any]
-    """Of the algorithm."""
+    """Hyperparameters of the algorithm."""
 
     def plain(self) -> dict[str, Any]:
-        """Itself as JSON has it."""
+        """The run as JSON has it."""
         return dict(plain_data(self))
 
     def checked(self) -> Run:
-        """Itself, when an environment and an algorithm can be made of it.
+        """The run itself, when an environment and an algorithm can be made of it.
 
         Raises:
             ValueError: a name or value that is not allowed.
@@ -126,10 +126,10 @@ def load(
 
 def _seen(wrapper: Any) -> str:
     """The kind of observation that ``env_wrapper`` asks for."""
-    one = wrapper[0] if isinstance(wrapper, list) and len(wrapper) == 1 else None
-    if not isinstance(one, dict) or list(one) != [VIEW]:
+    view = wrapper[0] if isinstance(wrapper, list) and len(wrapper) == 1 else None
+    if not isinstance(view, dict) or list(view) != [VIEW]:
         raise ValueError(f"env_wrapper={wrapper!r} must be a list of {VIEW} with its arguments alone")
-    arguments = mapping("argument of agent_view", one[VIEW], {"observation"})
+    arguments = mapping("argument of agent_view", view[VIEW], {"observation"})
     return choice("observation", arguments.get("observation", "smo"), KINDS)
 
 

@@ -14,7 +14,7 @@ from .protocol import Compiled, Estimator, Observer
 
 
 class Compiling:
-    """For observers that have a ``part``: the estimator that runs it."""
+    """Gives an observer that has a ``part`` the estimator that runs it."""
 
     __slots__ = ()
 

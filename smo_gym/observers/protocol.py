@@ -59,5 +59,5 @@ class Compiled(Protocol):
     """An observer whose work is a block, so that it runs inside of the compiled loop."""
 
     def part(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Part:
-        """What it puts into a loop of n slots; arguments and errors as of :meth:`Observer.start`."""
+        """What the observer puts into a loop of n slots; arguments and errors as of :meth:`Observer.start`."""
         ...

@@ -150,7 +150,7 @@ class SlidingModeObserver(Compiling):
         return asdict(self)
 
     def part(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Part:
-        """What it puts into a loop of n slots.
+        """What the observer puts into a loop of n slots.
 
         Raises:
             ValueError: the step does not divide ``dt`` or is too large for the gains (with the largest that works).

@@ -25,7 +25,7 @@ def affine(W: Array, x: Array, b: Array) -> Array:
 
 
 def dense(W: Array, x: Array, b: Array) -> Array:
-    """tanh(W x + b) of the same."""
+    """tanh(W x + b) for inputs x (inputs, n) and b (outputs,) or (outputs, n): (outputs, n)."""
     y = affine(W, x, b)
     _squash(y.reshape(-1))
     return y
@@ -78,7 +78,7 @@ def _affine(W: Array, x: Array, y: Array) -> None:
 
 @kernel
 def _affine_few(W: Array, x: Array, y: Array) -> None:
-    """The same sums for few slots: four outputs at a time, which do not wait for each other."""
+    """Add W x to y, in place, for few slots: four outputs at a time, which do not wait for each other."""
     outputs, inputs = W.shape
     fours = outputs - outputs % 4
     for s in range(x.shape[1]):

@@ -37,16 +37,16 @@ class Card(BaseModel):
     observation: str
     """One of :data:`~smo_gym.wrappers.view.KINDS`."""
     units: tuple[Positive, ...]
-    """Of one frame's entries: what they are divided by."""
+    """What each of one frame's entries is divided by."""
     frames: int = Field(ge=1)
     layers: tuple[Annotated[int, Field(ge=1)], ...] = Field(min_length=2)
-    """Widths, inputs first; tanh between them."""
+    """Widths of the layers, inputs first; tanh between them."""
     lstm: Annotated[int, Field(ge=1)] | None = None
     """Width of an LSTM in front of the layers."""
     force_limit: Positive
-    """N; what an action of 1 stands for."""
+    """Force in N that an action of 1 stands for."""
     control_period: Positive = HANGING.control_period
-    """s; that of its training. Where a card does not have it, it is taken from the environment's options."""
+    """Control period of its training in s. A card without it has that of the environment's options."""
 
     command: str = ""
     seed: int | None = None
@@ -56,7 +56,7 @@ class Card(BaseModel):
     curve: list[dict[str, float]] = []
     """Evaluations during training, on plants that training did not see."""
     measured: dict[str, float] = {}
-    """This policy, the best of the curve, on plants that neither training nor those evaluations saw."""
+    """What this policy, the best of the curve, gave on plants that neither training nor those evaluations saw."""
 
     @model_validator(mode="before")
     @classmethod
@@ -109,7 +109,7 @@ class MlpPolicy:
 
     @property
     def control_period(self) -> float:
-        """In s: that of its training."""
+        """The control period of its training in s."""
         return self.card.control_period
 
     def predict(
@@ -219,7 +219,7 @@ LSTM = ("lstm.weight_ih", "lstm.weight_hh", "lstm.bias_ih", "lstm.bias_hh")
 
 @dataclass(frozen=True)
 class LstmPolicy(MlpPolicy):
-    """The same behind an LSTM of width m, whose gates i, f, g, o stand below each other as torch has them.
+    """An :class:`MlpPolicy` behind an LSTM of width m, whose gates i, f, g, o stand below each other as torch has them.
 
     ::
 

@@ -39,7 +39,7 @@ class ZipPolicy:
     policy: Any
     frames: int
     units: Array
-    """Of one frame, (entries,)."""
+    """What each of one frame's entries is divided by, (entries,)."""
     force_limit: float = HANGING.force_limit
     control_period: float = HANGING.control_period
 

@@ -114,7 +114,7 @@ def lost_of(xhat: Array) -> Flags | None:
 
 
 def space_of(inner: spaces.Space[Any]) -> spaces.Space[Array]:
-    """Of observations to which an estimate is appended."""
+    """The space of observations to which an estimate is appended."""
     assert isinstance(inner, spaces.Box)
     return spaces.Box(-np.inf, np.inf, (*inner.shape[:-1], inner.shape[-1] + 4), np.float64)
 

@@ -32,8 +32,10 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         **settings: as for :class:`ObserverWrapper`.
 
     Raises:
-        TypeError: as :class:`ObserverWrapper`.
-        ValueError: as :class:`ObserverWrapper`; or a sequence of another length than there are slots.
+        TypeError: the environment is not one of this package, or ``observer`` is not an observer.
+        ValueError: an unknown observer or setting, settings beside an object, a step that the observer is not
+            stable at, a wrapper inside that changes what the encoders measured, or a sequence of another length than
+            there are slots.
     """
 
     def __init__(

@@ -129,8 +129,9 @@ class VectorAgentView(VectorWrapper[Single, Array, Array, Array, Array]):
     """The vector twin of :func:`agent_view`, in all three autoreset modes.
 
     Raises:
-        TypeError: as :func:`agent_view`.
-        ValueError: as :func:`agent_view`.
+        TypeError: the environment is not one of this package.
+        ValueError: an unknown kind, an environment without a force limit, or one that has an observer already or
+            whose observation is otherwise changed.
     """
 
     def __init__(self, env: VectorEnv[Array, Array, Array], observation: str = "smo") -> None:

@@ -51,13 +51,13 @@ def test_averages_and_reductions_of_table_4_follow_from_its_cells():
 def test_what_the_article_says_of_its_own_cells():
     found = consistency.checks()
     assert len(found) == 72 + 64 + 2
-    disagreeing = [one for one in found if one.agrees != "yes"]
-    averages_of_table_5 = [one for one in disagreeing if one.table == "5"]
-    assert {(one.row, one.quantity, one.agrees) for one in averages_of_table_5} == {
+    disagreeing = [check for check in found if check.agrees != "yes"]
+    averages_of_table_5 = [check for check in disagreeing if check.table == "5"]
+    assert {(check.row, check.quantity, check.agrees) for check in averages_of_table_5} == {
         ("average", "mse reduction", "as the mean of reductions")
     }
     assert len(averages_of_table_5) == 4
-    (claim,) = (one for one in disagreeing if one.table != "5")
+    (claim,) = (check for check in disagreeing if check.table != "5")
     assert (claim.table, claim.state, claim.printed, claim.agrees) == ("abstract", "theta", 29.0, "no")
     assert claim.recomputed == pytest.approx(18.55, abs=0.01)
 
@@ -68,11 +68,11 @@ def test_table_2_is_the_default_plant():
 
 def test_the_scenarios_have_the_printed_levels_cases_and_gains():
     for name, table in (("regulation", "4"), ("initial-conditions", "5")):
-        one = scenario.named(name)
-        assert {f"{100 * x:g}" for x in one.uncertainty.value} >= {
+        chosen = scenario.named(name)
+        assert {f"{100 * x:g}" for x in chosen.uncertainty.value} >= {
             c.uncertainty_percent for c in cells(table=table)
         } - {""}
-        assert set(one.initial_states.value) == {c.case for c in cells(table=table)}
-        smc = one.controllers["smc"]
+        assert set(chosen.initial_states.value) == {c.case for c in cells(table=table)}
+        smc = chosen.controllers["smc"]
         assert {key: getattr(smc, key).value for key in ("Z0", "lam", "epsilon")} == article.SMC_GAINS
-        assert [settings.observer.gains.value for settings in one.controllers.values()] == ["lqr", "smc"]
+        assert [settings.observer.gains.value for settings in chosen.controllers.values()] == ["lqr", "smc"]

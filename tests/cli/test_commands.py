@@ -47,7 +47,7 @@ def test_every_command_is_a_module_with_a_file_in_agents():
 def test_all_three_do_the_same(script):
     done = [run(*start, "--all") for start in ([*script, "consistency"], [*MODULE, "consistency"])]
     done.append(run(sys.executable, str(ROOT / "agents" / "consistency.py"), "--all"))
-    assert {(one.returncode, one.stdout, one.stderr) for one in done} == {(0, done[0].stdout, "")}
+    assert {(process.returncode, process.stdout, process.stderr) for process in done} == {(0, done[0].stdout, "")}
     assert "133 of 138 printed numbers follow" in done[0].stdout
 
 

@@ -30,9 +30,9 @@ def test_lqr_is_minus_gain_times_estimate():
     action, state = LQR(K).predict(observation)
     np.testing.assert_allclose(action, -observation[:, 2:] @ K[:, None])
     assert state is None
-    one, _ = LQR(K).predict(observation[2])
-    assert one.shape == (1,)
-    assert one[0] == action[2, 0]
+    alone, _ = LQR(K).predict(observation[2])
+    assert alone.shape == (1,)
+    assert alone[0] == action[2, 0]
 
 
 def test_lqr_may_have_a_gain_a_slot():

@@ -21,7 +21,7 @@ KINDS = (*standard_transformations, implicit_multiplication)
 
 def formula(start):
     """The right-hand side of the one formula that begins so, without its number."""
-    (found,) = [one for one in FORMULAS if one.startswith(start)]
+    (found,) = [candidate for candidate in FORMULAS if candidate.startswith(start)]
     return re.sub(r"\\tag\{\d+\}", "", found.partition("=")[2])
 
 

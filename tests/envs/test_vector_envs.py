@@ -274,10 +274,10 @@ def test_a_scalar_reset_that_raised_changes_nothing():
 def test_an_action_of_another_type_is_named(make_vec):
     env = make_vec(2)
     env.reset()
-    one = gymnasium.make("SMOPendulum-v0").unwrapped
-    one.reset()
+    single = gymnasium.make("SMOPendulum-v0").unwrapped
+    single.reset()
     for action in ("abc", [[1j], [0]], [["a"], ["b"]], {}, [[1.0], [2.0, 3.0]], None):
         with pytest.raises(ValueError, match="action"):
             env.step(action)
         with pytest.raises(ValueError, match="action"):
-            one.step(action)
+            single.step(action)

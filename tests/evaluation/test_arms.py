@@ -126,7 +126,7 @@ def test_compiled_observers_of_all_kinds_share_a_batch(own, small, monkeypatch):
 def test_scenarios_that_differ_in_their_designed_gains_each_have_their_own(small):
     more = small.designed.margin.model_copy(update={"value": 0.12})  # of the same step
     other = small.model_copy(update={"designed": small.designed.model_copy(update={"margin": more})})
-    wanted = [study.groups([one], ["lqr"], ["theorem"], 1) for one in (small, other)]
+    wanted = [study.groups([place], ["lqr"], ["theorem"], 1) for place in (small, other)]
     together = study.measure([*wanted[0], *wanted[1]], seed=0)
     alone = [outcome for groups in wanted for outcome in study.measure(groups, seed=0)]
     for a, b in zip(together, alone, strict=True):

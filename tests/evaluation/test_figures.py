@@ -185,8 +185,8 @@ def test_files_are_vector_and_raster_and_the_same_again(drawn, monkeypatch):
 
 
 def test_one_arm_of_one_plant_is_drawn_too():
-    one = load("tracking", uncertainty=(0.0,))
-    outcomes = study.measure(study.groups([one], ["smc"], ["with"], 1), seed=0, samples=100)
+    tracking = load("tracking", uncertainty=(0.0,))
+    outcomes = study.measure(study.groups([tracking], ["smc"], ["with"], 1), seed=0, samples=100)
     results = statistics.results(outcomes)
     drawn, left_out = figures.planned([outcome.group for outcome in outcomes])
     assert [plan.number for plan in drawn] == [14, 15, 16, 17]
@@ -199,8 +199,8 @@ def test_one_arm_of_one_plant_is_drawn_too():
 
 
 def test_failed_runs_end_where_they_failed():
-    one = load("initial-conditions", horizon=3.0, track_limit=1.03)
-    outcomes = study.measure(study.groups([one], ["lqr"], ["without", "with"], 3), seed=0, samples=100)
+    table5 = load("initial-conditions", horizon=3.0, track_limit=1.03)
+    outcomes = study.measure(study.groups([table5], ["lqr"], ["without", "with"], 3), seed=0, samples=100)
     (plan,) = (plan for plan in figures.PLANS if plan.number == 9)
     figure = figures.draw(plan, outcomes, [])
     failed = [o for o in outcomes if plan.shows(o.group) and o.group.uncertainty and o.failed.any()]

@@ -37,10 +37,10 @@ def measured(tmp_path_factory):
     data["initial_states"]["value"] = {name: [1.0, 1.0, 0.1, 0.01] for name in NAMES[:-1]}
     path = tmp_path_factory.mktemp("names") / "names.yaml"
     path.write_text(yaml.safe_dump(data))
-    one = scenario.load(path)
-    laws = dict.fromkeys(NAMES, one.controllers["lqr"])
-    one = one.model_copy(update={"controllers": laws, "table": NAMES[5], "title": NAMES[-2]})
-    return study.measure(study.groups([one], NAMES, ["without", "with"], 2), seed=0, samples=5)
+    place = scenario.load(path)
+    laws = dict.fromkeys(NAMES, place.controllers["lqr"])
+    place = place.model_copy(update={"controllers": laws, "table": NAMES[5], "title": NAMES[-2]})
+    return study.measure(study.groups([place], NAMES, ["without", "with"], 2), seed=0, samples=5)
 
 
 def by_polars(text):
@@ -126,7 +126,7 @@ def test_the_report_names_controllers_as_the_tables_do(measured):
     text.encode()
     shown = [row[0] for row in Page(text).rows if row and row[0].startswith("Table ")]
     for name in NAMES:
-        assert any(tables.title(name) in one for one in shown), name
+        assert any(tables.title(name) in heading for heading in shown), name
     assert tables.title("twins:Twin") == "twins:Twin"
     assert tables.title("runs/a.safetensors-tracking") == "runs/a.safetensors-tracking"
     assert tables.title("smc-tracking") == "SMC-TRACKING"
@@ -146,10 +146,10 @@ def test_the_charts_buttons_are_these(measured):
 
 def test_a_scenario_and_its_runs_can_be_pickled(measured):
     group = measured[0].group
-    for one in (group.scenario, group):
-        again = pickle.loads(pickle.dumps(one))
-        assert again == one
-        assert repr(again) == repr(one)
+    for original in (group.scenario, group):
+        again = pickle.loads(pickle.dumps(original))
+        assert again == original
+        assert repr(again) == repr(original)
     again = pickle.loads(pickle.dumps(measured[0]))
     assert again.group == group
     for name, values in measured[0].metrics.items():
@@ -158,8 +158,8 @@ def test_a_scenario_and_its_runs_can_be_pickled(measured):
 
 
 def test_an_unknown_arm_is_named(measured):
-    one = measured[0].group.scenario
+    place = measured[0].group.scenario
     with pytest.raises(ValueError, match="unknown arm 'orcale': did you mean 'oracle'"):
-        study.groups([one], ["=1+1"], ["with", "orcale"], 1)
+        study.groups([place], ["=1+1"], ["with", "orcale"], 1)
     with pytest.raises(ValueError, match="unknown arm 'off'"):
-        study.Group(one, "=1+1", 0.1, "", "off", 1)
+        study.Group(place, "=1+1", 0.1, "", "off", 1)

@@ -44,8 +44,8 @@ def long_rod():
     del gymnasium.registry["LongRodOfATest-v0"]
 
 
-def measured(one):
-    return study.measure(study.groups([one], ["lqr", "smc"], ["with", "theorem"], 2), seed=0, samples=10)
+def measured(place):
+    return study.measure(study.groups([place], ["lqr", "smc"], ["with", "theorem"], 2), seed=0, samples=10)
 
 
 def test_a_longer_rod_runs_as_in_an_environment_registered_with_it(load, long_rod):
@@ -60,12 +60,14 @@ def test_a_longer_rod_runs_as_in_an_environment_registered_with_it(load, long_ro
 
 
 def test_the_design_is_for_the_scenarios_plant(load, monkeypatch):
-    one = load(LONG)
-    assert one.task.params == CartPendulum(rod_length=0.6)
+    place = load(LONG)
+    assert place.task.params == CartPendulum(rod_length=0.6)
     designed_for = []
-    over = type(one.designed).over
-    monkeypatch.setattr(type(one.designed), "over", lambda self, model: designed_for.append(model) or over(self, model))
-    for outcome in measured(one):
+    over = type(place.designed).over
+    monkeypatch.setattr(
+        type(place.designed), "over", lambda self, model: designed_for.append(model) or over(self, model)
+    )
+    for outcome in measured(place):
         assert outcome.left is None or outcome.group.arm == "theorem"
     assert designed_for
     assert {model.rod_length for model in designed_for} == {0.6}

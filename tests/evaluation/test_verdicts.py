@@ -15,8 +15,8 @@ from smo_gym.evaluation.statistics import place, results
 @pytest.fixture(scope="module")
 def regulation():
     """Table 4's LQR runs, six plants a level."""
-    one = scenario.named("regulation")
-    return study.measure(study.groups([one], ["lqr"], ["without", "with"], 6), 0)
+    table4 = scenario.named("regulation")
+    return study.measure(study.groups([table4], ["lqr"], ["without", "with"], 6), 0)
 
 
 def test_the_ceiling_is_the_share_of_ten_run_means_near_the_true_one():
@@ -44,34 +44,34 @@ def test_most_of_the_gain_is_there_without_uncertainty(regulation):
     assert gains[0.0] > 0.99 * max(gains.values())
 
 
-def runs(one, name, start, plants, xhat0=None):
+def runs(chosen, name, start, plants, xhat0=None):
     """MSEs and failures of a scenario's controller with compensation from one start on some plants."""
-    observer = one.controllers[name].observer.build(compensation=True)
+    observer = chosen.controllers[name].observer.build(compensation=True)
     observer = observer if xhat0 is None else replace(observer, xhat0=xhat0)
-    env = gymnasium.make_vec(one.environment, len(plants), autoreset_mode="Disabled", **one.environment_options)
+    env = gymnasium.make_vec(chosen.environment, len(plants), autoreset_mode="Disabled", **chosen.environment_options)
     options = {"state": np.tile(np.asarray(start, dtype=float), (len(plants), 1)), "params": plants}
-    return rollout(VectorObserverWrapper(env, observer), one.agent(name), options=options)
+    return rollout(VectorObserverWrapper(env, observer), chosen.agent(name), options=options)
 
 
 @pytest.mark.slow
 def test_falls_from_far_come_from_the_start_of_the_estimate():
-    one = scenario.named("upright")
+    upright = scenario.named("upright")
     rng = np.random.default_rng(0)
     plants = np.array([CartPendulum(gravity=9.8).draw(0.2, rng).as_array() for _ in range(100)])
     start = [0.0, 0.4, 0.0, 0.0]
-    assert runs(one, "lqr", start, plants).failed.sum() == 18
-    assert runs(one, "lqr", start, plants, xhat0=tuple(start)).failed.sum() == 0
+    assert runs(upright, "lqr", start, plants).failed.sum() == 18
+    assert runs(upright, "lqr", start, plants, xhat0=tuple(start)).failed.sum() == 0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "least"), [("regulation", 0.01), ("tracking", 0.03)])
 def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
-    one = scenario.named(name)
+    chosen = scenario.named(name)
     rng = np.random.default_rng(0)
     plants = np.array([CartPendulum().draw(0.2, rng).as_array() for _ in range(40)])
-    (start,) = one.initial_states.value.values()
+    (start,) = chosen.initial_states.value.values()
     moved = [start[0] + 1e-15, *start[1:]]
-    a, b = (runs(one, "smc", x0, plants).metrics for x0 in (start, moved))
+    a, b = (runs(chosen, "smc", x0, plants).metrics for x0 in (start, moved))
     for metric in ("mse_h", "mse_theta"):
         print(name, metric, np.abs(b[metric] / a[metric] - 1.0).max(), b[metric].mean() / a[metric].mean() - 1.0)
     assert max(np.abs(b[m] / a[m] - 1.0).max() for m in ("mse_h", "mse_theta")) > least
@@ -80,8 +80,8 @@ def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
 
 @pytest.mark.slow
 def test_table_7_scatters_more_than_ten_runs_explain():
-    one = scenario.named("tracking")
-    outcomes = study.measure(study.groups([one], ["smc"], ["without", "with"], 200), 0)
+    table7 = scenario.named("tracking")
+    outcomes = study.measure(study.groups([table7], ["smc"], ["without", "with"], 200), 0)
     cells = [r for r in results(outcomes) if r.cell.metric == "mse" and not r.cell.is_average and r.published > 0.0]
     assert len(cells) == 24
     assert sum(abs(math.expm1(r.deviation)) <= 0.1 for r in cells) == 4

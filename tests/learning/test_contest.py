@@ -114,10 +114,10 @@ def test_a_seed_is_one_draw_however_many_plants_it_meets():
 
 def test_pairs_share_their_plants():
     plants = np.random.default_rng(1).uniform(1.0, 5.0, (1, 30)).repeat(5, axis=0)
-    one = bootstrap.compare(scores(0.99 * plants), scores(plants, "positions"))
-    assert one.verdict == "yes"
-    assert one.ratio.value == pytest.approx(0.99)
-    assert (one.probability.low, one.probability.value, one.probability.high) == (1.0, 1.0, 1.0)
+    comparison = bootstrap.compare(scores(0.99 * plants), scores(plants, "positions"))
+    assert comparison.verdict == "yes"
+    assert comparison.ratio.value == pytest.approx(0.99)
+    assert (comparison.probability.low, comparison.probability.value, comparison.probability.high) == (1.0, 1.0, 1.0)
     assert bootstrap.compare(scores(plants), scores(0.99 * plants, "positions")).verdict == "no, it is worse"
     same = bootstrap.compare(scores(plants), scores(plants, "positions"))
     assert (same.verdict, same.probability.value) == ("undecided", 0.5)
@@ -129,30 +129,30 @@ def test_no_level_is_trimmed_away():
     better[:, -1] = 100.0 * plants[:, -1]
     *levels, overall = bootstrap.interquartile_means(scores(better))
     assert overall.value == pytest.approx(np.mean([level.value for level in levels]))
-    one = bootstrap.compare(scores(better), scores(plants, "positions"))
-    assert one.verdict == "no, it is worse"
-    assert one.ratio.value == pytest.approx((5 * 0.95 + 100.0) / 6)
+    comparison = bootstrap.compare(scores(better), scores(plants, "positions"))
+    assert comparison.verdict == "no, it is worse"
+    assert comparison.ratio.value == pytest.approx((5 * 0.95 + 100.0) / 6)
 
 
 def test_a_verdict_says_who_fails_more_often():
     plants = np.random.default_rng(1).uniform(1.0, 5.0, (5, 30))
     fails = 0.5 * plants
     fails[:, :3] = FAILED
-    one = bootstrap.compare(scores(fails), scores(plants, "positions"))
-    assert one.verdict == "yes, of the runs that stand; it fails more often"
-    assert contest_table.sentence(one).endswith("(failed: 15 of 150 against 0 of 150).")
+    comparison = bootstrap.compare(scores(fails), scores(plants, "positions"))
+    assert comparison.verdict == "yes, of the runs that stand; it fails more often"
+    assert contest_table.sentence(comparison).endswith("(failed: 15 of 150 against 0 of 150).")
     plants[:, :3] = FAILED
-    one = bootstrap.compare(scores(fails), scores(plants, "positions"))
-    assert one.verdict == "yes"
-    assert contest_table.sentence(one).endswith("(failed: 15 of 150 against 15 of 150).")
+    comparison = bootstrap.compare(scores(fails), scores(plants, "positions"))
+    assert comparison.verdict == "yes"
+    assert contest_table.sentence(comparison).endswith("(failed: 15 of 150 against 15 of 150).")
 
 
 def test_few_seeds_decide_nothing():
     plants = np.random.default_rng(1).uniform(1.0, 5.0, (5, 30))
     for a, b in ((4, 5), (5, 4), (2, 2)):
-        one = bootstrap.compare(scores(0.5 * plants[:a]), scores(plants[:b], "positions"))
-        assert one.verdict == "open: a verdict needs five training seeds"
-        assert one.ratio.value == pytest.approx(0.5, abs=0.1)
+        comparison = bootstrap.compare(scores(0.5 * plants[:a]), scores(plants[:b], "positions"))
+        assert comparison.verdict == "open: a verdict needs five training seeds"
+        assert comparison.ratio.value == pytest.approx(0.5, abs=0.1)
     law = scores(plants[:1], learned=False)
     assert bootstrap.compare(scores(0.1 * plants), law).verdict == "yes"
     few = bootstrap.compare(scores(plants[:, :1]), scores(plants[:, :1], "positions"))

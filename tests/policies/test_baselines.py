@@ -61,7 +61,11 @@ def test_what_is_measured_beside_it_does_not_change_a_bit():
 
     def errors(controllers, arms):
         outcomes = study.measure(study.groups([place], controllers, arms, 3), 0)
-        return [one.metrics["mse_h"] for one in outcomes if (one.group.controller, one.group.arm) == ("ppo", "with")]
+        return [
+            outcome.metrics["mse_h"]
+            for outcome in outcomes
+            if (outcome.group.controller, outcome.group.arm) == ("ppo", "with")
+        ]
 
     alone = errors(["ppo"], ["with"])
     assert len(alone) == len({0.0, *place.uncertainty.value})

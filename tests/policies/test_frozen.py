@@ -245,7 +245,7 @@ def test_the_shipped_policy_acts_alone_as_among_thousands():
     policy = shipped("SMOPendulum-v0")
     observations = np.random.default_rng(0).normal(size=(5000, 6))
     together, _ = policy.predict(observations)
-    assert np.array_equal(together, np.stack([policy.predict(one)[0] for one in observations]))
+    assert np.array_equal(together, np.stack([policy.predict(observation)[0] for observation in observations]))
 
 
 def test_a_policy_that_lacks_its_observer_says_what_to_do():

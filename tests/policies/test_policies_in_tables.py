@@ -209,7 +209,7 @@ def test_who_cannot_act_somewhere_is_left_out_there(here, capsys):
     scenarios = [scenario.load(Path("short.yaml")), scenario.named("tracking")]
     more, names, left_out = evaluate.chosen(scenarios, ["a.safetensors", "smc"])
     assert names == ["a.safetensors", "smc"]
-    assert ["a.safetensors" in one.controllers for one in more] == [True, False]
+    assert ["a.safetensors" in place.controllers for place in more] == [True, False]
     assert [line.split(":")[0] for line in left_out] == ["left out of Tracking"]
     with pytest.raises(ValueError, match="no policy is shipped for SMOPendulumTracking-v0, only for"):
         evaluate.chosen(scenarios[1:], ["ppo"])

@@ -198,8 +198,8 @@ def test_an_estimate_that_is_lost_starts_anew_and_says_so(make_vec):
     # a spinning rod: h' of the estimate grows with theta'^2, and (35) has no bound for it
     settings = {"beta_1": [0.0, 0.0], "beta_2": [0.0, 0.0], "m1": [2.0, 2.0]}
     state, options = [0.0, 0.0, 0.0, 60.0], {"track_limit": None, "force_limit": None}
-    one = ObserverWrapper(gymnasium.make("SMOPendulum-v0", **options), gains=settings, xhat0=[0, 0, 0, 1e160])
-    observation, info = _until_lost(one, state, np.zeros(1))
+    single = ObserverWrapper(gymnasium.make("SMOPendulum-v0", **options), gains=settings, xhat0=[0, 0, 0, 1e160])
+    observation, info = _until_lost(single, state, np.zeros(1))
     assert info["estimate_failed"] is True
     assert np.array_equal(observation[2:], [0, 0, 0, 1e160])
     many = VectorObserverWrapper(make_vec(3, **options), gains=settings, xhat0=[0, 0, 0, 1e160])

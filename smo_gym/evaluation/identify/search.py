@@ -20,24 +20,24 @@ class Hypothesis:
     name: str = "as in configs/"
     gravity: float = -9.8
     horizon: float | None = None
-    """s."""
+    """Length of the runs in s."""
     estimate_starts_at_truth: bool = False
     time_constant: float = 0.0
-    """Of the observer's low-pass in s."""
+    """Time constant of the observer's low-pass in s; 0 for none."""
     elements: int | None = None
-    """Intervals of constant force of the reference."""
+    """Number of intervals of constant force in the reference."""
 
 
 class Problem(Protocol):
     """Published numbers as a function of unprinted settings."""
 
     parameters: ClassVar[dict[str, tuple[float, float]]]
-    """Name to bounds; all are searched on a logarithmic scale."""
+    """Bounds of each parameter by its name; all are searched on a logarithmic scale."""
     alternatives: ClassVar[tuple[Hypothesis, ...]]
-    """Hypotheses to reject."""
+    """Hypotheses to reject, each by a search of its own."""
 
     def labels(self) -> list[str]:
-        """The numbers that are fitted."""
+        """Names of the numbers that are fitted, in their order."""
         ...
 
     def deviations(self, points: Array, hypothesis: Hypothesis) -> Array:
@@ -108,14 +108,14 @@ class Search:
 
     @property
     def generations(self) -> int:
-        """How many there have been."""
+        """How many generations there have been."""
         return len(self.costs)
 
     def _normal(self, *shape: int) -> Array:
         return self._generator.standard_normal(shape)
 
     def step(self) -> None:
-        """One generation."""
+        """Draw a generation of candidates, evaluate them and learn from them."""
         points = np.array(self.strategy.ask())
         self._tell(points, cost(self.problem, points, self.hypothesis))
 

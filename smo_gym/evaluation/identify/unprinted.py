@@ -47,7 +47,7 @@ def _mse(
 
     Args:
         scenario: gives the environment.
-        hypothesis: on top of it.
+        hypothesis: what is taken for granted instead of the scenario's settings.
         observers: one a candidate.
         agent: of all candidates, for so many consecutive slots each.
         starts: x(0), (candidates, starts, 4).
@@ -136,7 +136,7 @@ def _table5(controller: str, cases: Sequence[str]) -> list[Any]:
 
 
 def _labels(first: Sequence[str]) -> list[str]:
-    return [f"{one}, {arm}, {state}" for one in first for arm in PRINTED for state in STATES]
+    return [f"{place}, {arm}, {state}" for place in first for arm in PRINTED for state in STATES]
 
 
 class Lqr:
@@ -167,11 +167,11 @@ class Lqr:
         self._cells = _table5("lqr", list(self._cases))
 
     def labels(self) -> list[str]:
-        """Case, arm, state."""
+        """Case, arm and state of each fitted cell of Table 5."""
         return _labels([f"case {c}" for c in self._cases])
 
     def deviations(self, points: Array, hypothesis: Hypothesis) -> Array:
-        """As :class:`~.search.Problem`."""
+        """log(measured / published) of each cell at points (m, parameters) on the log10 scale, (m, cells)."""
         values = 10.0 ** np.asarray(points)
         model = CartPendulum(gravity=hypothesis.gravity)
         K = np.array([LQR.design(v[:4], 1.0, model).K[0] for v in values])
@@ -212,16 +212,16 @@ class Regulation:
         self._averages = [_averages("4", name, regulation.uncertainty.value) for name in ("smc", "lqr")]
 
     def labels(self) -> list[str]:
-        """Table 5's cells, then Table 4's averages."""
+        """Case, arm and state of Table 5's cells, then controller, arm and state of Table 4's averages."""
         return _labels([f"Table 5, case {c}" for c in self._cases] + ["Table 4, SMC", "Table 4, LQR"])
 
     def deviations(self, points: Array, hypothesis: Hypothesis) -> Array:
-        """As :class:`~.search.Problem`."""
+        """log(measured / published) of each cell at points (m, parameters) on the log10 scale, (m, cells)."""
         values = 10.0 ** np.asarray(points)
         lqr, smc = (self.table4.controllers[name] for name in ("lqr", "smc"))
         assert isinstance(lqr, LqrSettings)
         dt = self.table4.control_period.value
-        smc_observers, lqr_observers = ([one.observer.build(True)] * len(values) for one in (smc, lqr))
+        smc_observers, lqr_observers = ([controller.observer.build(True)] * len(values) for controller in (smc, lqr))
 
         def law(n: int) -> SlidingModeController:
             return SlidingModeController(
@@ -255,11 +255,11 @@ class Tracking:
         self._averages = _averages("7", "smc-tracking", tracking.uncertainty.value)
 
     def labels(self) -> list[str]:
-        """Arm, state."""
+        """Arm and state of each column average of Table 7."""
         return _labels(["average"])
 
     def deviations(self, points: Array, hypothesis: Hypothesis) -> Array:
-        """As :class:`~.search.Problem`."""
+        """log(measured / published) of each cell at points (m, parameters) on the log10 scale, (m, cells)."""
         settings, dt = self.scenario.controllers["smc"], self.scenario.control_period.value
         assert isinstance(settings, SmcSettings)
         k = 10.0 ** np.asarray(points)

@@ -58,12 +58,12 @@ class Plan:
 
     @property
     def name(self) -> str:
-        """Of its files."""
+        """Name of the figure's files, without suffix."""
         case = f"-case-{self.case}" if self.case else ""
         return f"figure-{self.number:02d}-{self.kind}-{'-'.join(self.controllers)}{case}"
 
     def shows(self, group: Group) -> bool:
-        """Whether runs of a group belong to it, at some level of uncertainty."""
+        """Whether runs of a group belong to the figure, at some level of uncertainty."""
         place = (group.scenario.table == self.table, group.name in self.controllers, group.arm in PRINTED)
         return all(place) and self.case in (None, group.case)
 
@@ -107,7 +107,7 @@ def planned(groups: Iterable[Group]) -> tuple[list[Plan], list[Plan]]:
 
 
 def draw(plan: Plan, outcomes: Iterable[Outcome], results: Iterable[Result]) -> Figure:
-    """One figure.
+    """Draw one of the article's figures from our runs.
 
     Args:
         plan: of :data:`PLANS`.

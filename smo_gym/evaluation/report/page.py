@@ -49,7 +49,7 @@ def check(groups: Sequence[Group], path: Path) -> None:
 
 
 def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str, versions: Mapping[str, str]) -> str:
-    """The page.
+    """The report as the text of one HTML file.
 
     Args:
         outcomes: of :func:`smo_gym.evaluation.study.measure`, with traces.
@@ -117,7 +117,7 @@ def _json(figures: Mapping[str, Any]) -> str:
 
     def text(figure: Any) -> str:
         if isinstance(figure, dict):
-            return "{" + ",".join(f"{json.dumps(name)}:{text(one)}" for name, one in figure.items()) + "}"
+            return "{" + ",".join(f"{json.dumps(name)}:{text(value)}" for name, value in figure.items()) + "}"
         return "null" if figure is None else str(figure.to_json())
 
     return text(figures).replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

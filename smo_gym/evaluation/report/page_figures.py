@@ -162,7 +162,7 @@ def short(value: float) -> float | None:
 
 
 def _quiet(figure: Figure, height: int, **layout: Any) -> Figure:
-    """What all share; the page adds the colours of light or dark."""
+    """The layout that all figures share; the page adds the colours of light or dark."""
     figure.update_xaxes(showline=False, zeroline=False, ticks="")
     figure.update_yaxes(showline=False, ticks="", automargin=True)
     figure.update_layout(

@@ -23,7 +23,7 @@ CHANNELS = (*STATE_NAMES, *(f"error_{name}" for name in STATE_NAMES), "force_low
 LEVELS = np.array([2**14 - 1] * 8 + [2**10 - 1] * 3)
 """Steps of a channel between its least and largest value: what a plot shows, enlarged some times."""
 MOST_VALUES = 4_000_000
-"""So many take about 5 MB."""
+"""Most values in a page; so many take about 5 MB."""
 _LARGEST = 1e4  # an estimate that has diverged
 
 

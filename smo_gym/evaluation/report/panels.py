@@ -27,12 +27,12 @@ COLOURS = {
     "smc": {WITHOUT: "#D55E00", WITH: "#000000"},  # red, black
     "smc-tracking": {WITHOUT: "#CC79A7", WITH: "#005F45"},  # purple, green (darker, for a print in grey)
 }
-"""Of each published controller's arms, by the article's captions."""
+"""Colours of each published controller's arms, by the article's captions."""
 TITLES = {"lqr": "LQR", "smc": "SMC", "smc-tracking": "SMC tracking"}
 Columns = Mapping[str, Sequence[Outcome]]
 """What each column of panels shows, by its title."""
 WINDOW = 0.25
-"""s; chattering is averaged over it."""
+"""Length in s of the window that chattering is averaged over."""
 _POSITIONS = (("h", "m"), ("\\theta", "rad"))
 _WIDTH = 6.9  # in, a page's text
 _START = 3.0  # s, of the estimation errors
@@ -115,7 +115,7 @@ def bars(columns: Mapping[str, Sequence[Result]], label: str) -> Figure:
 
 
 def _bars(panel: Axes, name: str, cells: Sequence[Result]) -> None:
-    """Beside each other: without published, without measured, with published, with measured."""
+    """Bars beside each other: without published, without measured, with published, with measured."""
     places = [
         ", ".join(filter(None, (r.cell.case and f"case {mathtext(r.cell.case)}", r.cell.uncertainty_percent)))
         for r in cells
@@ -201,7 +201,7 @@ def _finished(figure: Figure, axes: NDArray[Any], titles: Sequence[str]) -> Figu
 
 
 def _legend(panel: Axes, title: str) -> None:
-    """Above the panel, where no line runs through it; a title alone where nothing has a name."""
+    """A legend above the panel, where no line runs through it; a title alone where nothing has a name."""
     if panel.get_legend_handles_labels()[1]:
         panel.legend(title=title, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     else:

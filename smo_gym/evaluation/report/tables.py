@@ -91,13 +91,13 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
-    """What else the runs showed: a table, and what the compensation costs."""
+    """What the runs showed beside their MSE: a table, and what the compensation costs."""
     lines = (formats.escaped(line, form) for line in verdicts.costs(outcomes))
     return "\n\n".join([_table(form, *diagnosed(outcomes)), *lines])
 
 
 def diagnosed(outcomes: Sequence[Outcome]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Header and rows of what else the runs showed, a mean over each controller's runs that did not fail.
+    """Header and rows of what the runs showed beside their MSE, a mean over each controller's runs that did not fail.
 
     The last column counts the runs that left the operating set which the theorem's gains are designed for.
     """

@@ -16,7 +16,7 @@ function dressed(figure) {
     if (/^[xy]axis/.test(name)) Object.assign(axis, { gridcolor: line, zerolinecolor: line });
   }
   layout.modebar = { bgcolor: clear, color: colour("--quiet"), activecolor: ink };
-  for (const one of layout.annotations ?? []) one.bgcolor = colour("--ground");
+  for (const note of layout.annotations ?? []) note.bgcolor = colour("--ground");
   for (const trace of figure.data) if (trace.meta?.ink) trace.line.color = colour("--quiet");
   return figure;
 }

@@ -120,7 +120,7 @@ $("#stage").addEventListener("keydown", (event) => {
   event.preventDefault();
 });
 $("#filter").addEventListener("input", (event) => filter(event.currentTarget));
-for (const one of document.forms) one.addEventListener("submit", (event) => event.preventDefault());
+for (const form of document.forms) form.addEventListener("submit", (event) => event.preventDefault());
 $("#bars-of").addEventListener("change", compare);
 for (const watch of document.querySelectorAll(".watch")) {
   watch.addEventListener("click", () => {
