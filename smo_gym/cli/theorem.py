@@ -31,9 +31,10 @@ from .. import (
     files,
     theorem,
 )
-from ..evaluation import configs, rollout, scenario
+from ..evaluation import configs, rollout, scenario, store
 from ..evaluation.scenario import Scenario, TheoremSettings
-from ..evaluation.theorem_on_runs import SHARES, Convergence, converge
+from ..evaluation.theorem_on_runs import SHARES, Convergence
+from ..evaluation.theorem_pieces import converge_in_pieces
 from ..evaluation.traces import Traces
 from .arguments import Parser
 from .entry import command
@@ -57,8 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     observer = settings.build(DT, over.model)
     with contextlib.nullcontext() if args.out is None else files.claimed(args.out, [RESULT]) as out:
         said_all = io.StringIO()
-        with contextlib.redirect_stdout(said_all):
-            parts(settings, over, observer, args.runs, args.seed)
+        with store.kept(out) if out else contextlib.nullcontext() as kept, contextlib.redirect_stdout(said_all):
+            parts(settings, over, observer, args.runs, args.seed, kept)
         try:
             if out is not None:
                 files.write(out / RESULT, said_all.getvalue())
@@ -68,7 +69,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def parts(
-    settings: TheoremSettings, over: theorem.OperatingSet, observer: SlidingModeObserver, count: int, seed: int
+    settings: TheoremSettings,
+    over: theorem.OperatingSet,
+    observer: SlidingModeObserver,
+    count: int,
+    seed: int,
+    kept: store.Store | None,
 ) -> None:
     """Print the three parts."""
     article = scenario.named("initial-conditions")
@@ -102,8 +108,8 @@ def parts(
     }
     law = article.agent("lqr")
     assert isinstance(law, LQR)
-    with tqdm(total=round(settings.horizon.value / DT), desc="samples", leave=False, disable=None) as bar:
-        found = converge(
+    with tqdm(total=count, desc="runs", leave=False, disable=None) as bar:
+        found = converge_in_pieces(
             observers,
             law,
             over,
@@ -112,6 +118,7 @@ def parts(
             force=settings.force.value,
             horizon=settings.horizon.value,
             settle=settings.settle.value,
+            store=kept,
             progress=bar.update,
         )
     runs(found, settings)

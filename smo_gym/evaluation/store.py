@@ -6,7 +6,7 @@ import hashlib
 import io
 import json
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import fields
 from functools import cache
@@ -22,6 +22,7 @@ from llvmlite.binding import get_host_cpu_name
 
 from .. import files
 from ..policies import named
+from ..typing import Array
 from . import metrics
 from .arms import arm
 from .settings import PolicySettings
@@ -47,6 +48,12 @@ def code() -> dict[str, str]:
         digest.update(f"{path.relative_to(PACKAGE).as_posix()}\0{_hash(path)}\n".encode())
     versions = {package.__name__: package.__version__ for package in COMPUTES}
     return {"python": platform.python_version(), **versions, "smo_gym": digest.hexdigest()}
+
+
+def digest(told: Any) -> str:
+    """Hash of what numbers depend on: what is told, as JSON, what computes them, and the processor."""
+    whole = [told, code(), platform.machine(), get_host_cpu_name()]
+    return hashlib.sha256(json.dumps(whole, sort_keys=True).encode()).hexdigest()
 
 
 class Store:
@@ -87,26 +94,19 @@ class Store:
             "group": [group.controller, group.uncertainty, group.case, group.arm, group.runs],
             "study": [seed, samples],
             "policy": policy,
-            "code": code(),
-            "processor": [platform.machine(), get_host_cpu_name()],
         }
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        return digest(told)
 
     def get(self, key: str, group: Group) -> Outcome | None:
         """What is kept of a group under a key; None where there is nothing, or nothing whole."""
-        try:
-            data = self._path(key).read_bytes()
-        except OSError:
+        found = self.read(key)
+        if found is None:
             return None
-        if data[:_DIGEST] != _sum(key, data[_DIGEST:]):
-            return None
-        with np.load(io.BytesIO(data[_DIGEST:]), allow_pickle=False) as arrays:
-            found = {name: arrays[name] for name in arrays.files}
         traces: dict[str, Any] = {field.name: found.get(f"trace:{field.name}") for field in fields(Traces)}
         return Outcome(
             group,
             dict(zip(found["names"].tolist(), found["metrics"], strict=True)),
-            found["failed"],
+            found["failed"].astype(np.bool_, copy=False),
             Traces(**traces) if traces["time"] is not None else None,
             found.get("plants"),
         )
@@ -121,8 +121,23 @@ class Store:
         }
         if outcome.traces is not None:
             arrays |= {f"trace:{field.name}": getattr(outcome.traces, field.name) for field in fields(Traces)}
+        self.write(key, {name: values for name, values in arrays.items() if values is not None})
+
+    def read(self, key: str) -> dict[str, Array] | None:
+        """The arrays that are kept under a key; None where there are none, or none whole."""
+        try:
+            data = self._path(key).read_bytes()
+        except OSError:
+            return None
+        if data[:_DIGEST] != _sum(key, data[_DIGEST:]):
+            return None
+        with np.load(io.BytesIO(data[_DIGEST:]), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+
+    def write(self, key: str, arrays: Mapping[str, Any]) -> None:
+        """Keep arrays, where they can be written."""
         file = io.BytesIO()
-        np.savez(file, **{name: values for name, values in arrays.items() if values is not None})
+        np.savez(file, **arrays)
         with suppress(OSError):
             files.write_bytes(self._path(key), _sum(key, file.getvalue()) + file.getvalue())
 

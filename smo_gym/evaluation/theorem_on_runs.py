@@ -47,12 +47,20 @@ class Convergence:
     """What the errors of h' in m/s and theta' in rad/s come below in the end, by ``theorem.velocity_bound``, (2,)."""
     velocity_settled: Array
     """Largest errors of h' in m/s and theta' in rad/s after the settling time, (2, n)."""
-    velocity_rms: dict[str, Array]
-    """RMS errors of h' in m/s and theta' in rad/s after the settling time, over runs that stayed; (2,) by observer."""
+    squares: dict[str, Array]
+    """Squared errors of h' and theta' summed over the control instants after the settling time, (2, n) by observer."""
+    settled_instants: int
+    """How many instants these are."""
     largest: Array
     """Largest |theta|, |h'|, |theta'|, their estimates and |u| over all runs in rad, m/s, rad/s and N, (7,)."""
     horizon: float
     """Length of the runs in s: what was promised for later was not tested."""
+
+    @property
+    def velocity_rms(self) -> dict[str, Array]:
+        """RMS errors of h' in m/s and theta' in rad/s after the settling time, over runs that stayed, by observer."""
+        n = self.settled_instants
+        return {name: np.sqrt(total[:, self.stayed].mean(axis=1) / n) for name, total in self.squares.items()}
 
     @property
     def tested(self) -> Flags:
@@ -193,9 +201,8 @@ class _Counters:
             bounded=self._bounded,
             velocity_bound=velocity_bound(self._first, self._over, self._force),
             velocity_settled=self._settled,
-            velocity_rms={
-                name: np.sqrt(total[:, stayed].mean(axis=1) / count) for name, total in self._squares.items()
-            },
+            squares=self._squares,
+            settled_instants=count,
             largest=self._largest,
             horizon=horizon,
         )
