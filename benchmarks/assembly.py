@@ -53,7 +53,7 @@ def blocks() -> Iterator[tuple[str, Any]]:
 
 def assembly(block: Any) -> str:
     """The instructions of a block itself, compiled anew: the cache keeps machine code without a listing."""
-    fresh: Any = numba.njit(**block.targetoptions)(block.py_func)
+    fresh: Any = numba.jit(**block.targetoptions)(block.py_func)
     fresh.compile(SIGNATURE.args)
     name = fresh.get_compile_result(SIGNATURE).fndesc.llvm_func_name
     text = fresh.inspect_asm(SIGNATURE.args)
