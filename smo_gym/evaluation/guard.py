@@ -16,8 +16,9 @@ def _guard(signals: Array, own: Array, lanes: int) -> None:
     for i in range(lanes):
         (h, theta), xhat, start = two(signals, Y, i), four(signals, XHAT, i), four(own, START, i)
         a, b, c, d = abs(xhat[0]), abs(xhat[1]), abs(xhat[2]), abs(xhat[3])
-        near = abs(h) < DIVERGED and abs(theta) < DIVERGED
-        fine = near and a < DIVERGED and b < DIVERGED and c < DIVERGED and d < DIVERGED
+        # "and" would branch, and a loop with so many branches is not vectorised
+        near = (abs(h) < DIVERGED) & (abs(theta) < DIVERGED)
+        fine = near & (a < DIVERGED) & (b < DIVERGED) & (c < DIVERGED) & (d < DIVERGED)
         put(signals, FAILED, i, at(signals, FAILED, i) if fine else 1.0)
         put_four(signals, XHAT, i, xhat if finite(xhat) else start)
 
