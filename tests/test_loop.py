@@ -191,6 +191,21 @@ def test_how_many_periods_a_call_drives_changes_no_bit(chunk, law):
     assert shown(in_chunks) == shown(at_once)
 
 
+@pytest.mark.parametrize("chunk", [1, 3, 7, 16])
+def test_how_many_periods_a_call_drives_changes_nothing_that_ended_slots_show(chunk):
+    x = cases(range(70))[1]
+    x[:, :64] = 1e300  # the whole first block ends at once
+    at_once, in_chunks = usual(70, kind=1), usual(70, kind=1)
+    for loop in (at_once, in_chunks):
+        loop.start(slice(None), x)
+    at_once.run(0, 50)
+    for k in range(0, 50, chunk):
+        in_chunks.run(k, min(chunk, 50 - k))
+    assert np.array_equal(signals(in_chunks), signals(at_once))
+    assert at_once.failed[:64].all()
+    assert (at_once.u[:64] == 0.0).all()
+
+
 @pytest.mark.parametrize("n", [65, 270, 300])
 def test_threads_change_no_bit(n, monkeypatch):
     monkeypatch.setattr("smo_gym.kernels.batch._WORTH_A_THREAD", 0.0)
