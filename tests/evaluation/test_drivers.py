@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from gymnasium.vector import VectorWrapper
 
 from smo_gym import LQR, SlidingModeController, SlidingModeObserver, VectorObserverWrapper
 from smo_gym.evaluation import metrics, rollout
@@ -40,20 +41,27 @@ def same(a, b, what):
     assert np.array_equal(a, b, equal_nan=a.dtype == np.float64), what
 
 
+class Between(VectorWrapper):
+    """A wrapper of a user's own, which might change what is measured: the observer then works outside of the loop."""
+
+
 def both(make_vec, law, observer, *, environment=HANGING, n=SLOTS, trace_every=3, options=None, **task):
-    """The two rollouts of a law, found equal to the bit; the first of them."""
+    """A law in and beside the compiled loop, its observer inside and outside: rollouts found equal to the bit."""
     found = []
-    for agent in (law, Asked(law)):
-        env = VectorObserverWrapper(make_vec(n, environment, autoreset_mode="Disabled", **task), observer)
+    for agent, between in ((law, False), (Asked(law), False), (Asked(law), True)):
+        env = make_vec(n, environment, autoreset_mode="Disabled", **task)
+        env = VectorObserverWrapper(Between(env) if between else env, observer)
+        assert env.plugged is not between
         found.append(rollout(env, agent, seed=0, options=options, trace_every=trace_every))
-    inside, outside = found
-    assert inside.metrics.keys() == outside.metrics.keys()
-    for name, values in inside.metrics.items():
-        same(values, outside.metrics[name], name)
-    same(inside.failed, outside.failed, "failed")
-    if trace_every is not None:
-        for name in ("time", "x", "xhat", "u", "u_low", "u_high", "u_mean"):
-            same(getattr(inside.traces, name), getattr(outside.traces, name), name)
+    inside, *others = found
+    for outside in others:
+        assert inside.metrics.keys() == outside.metrics.keys()
+        for name, values in inside.metrics.items():
+            same(values, outside.metrics[name], name)
+        same(inside.failed, outside.failed, "failed")
+        if trace_every is not None:
+            for name in ("time", "x", "xhat", "u", "u_low", "u_high", "u_mean"):
+                same(getattr(inside.traces, name), getattr(outside.traces, name), name)
     return inside
 
 
@@ -67,7 +75,7 @@ def test_a_law_with_a_part_is_driven_and_the_same_law_behind_predict_is_asked(ma
         driver = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *given, name=name, driver=driver: ran.append(name) or driver(*given))
     both(make_vec, LQR(K[HANGING]), SlidingModeObserver(), n=2, horizon=0.1)
-    assert ran == ["driven", "asked"]
+    assert ran == ["driven", "asked", "asked"]
 
 
 @pytest.mark.parametrize("environment", K)

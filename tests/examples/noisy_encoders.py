@@ -33,4 +33,4 @@ def make(num_envs, sigma=1e-3, **options):
     return NoisyEncoders(PendulumVectorEnv(num_envs, **options), sigma)
 
 
-gymnasium.register("Noisy-v0", entry_point="smo_gym.envs.pendulum:PendulumEnv", vector_entry_point=make)
+gymnasium.register("Noisy-v0", vector_entry_point=make)
