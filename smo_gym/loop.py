@@ -99,7 +99,7 @@ class Loop:
         x: states, (4, n); like all that follow a view of the rows.
         y: measurements [h, theta] now, (2, n).
         u: force in N, (n,).
-        xhat: estimates, (4, n).
+        xhat: estimates, (4, n); those of slots that have ended are held.
         x_d: where the states should be, (4, n).
         alive: 1 in slots that go on, 0 in those that hold still, (n,).
         failed: 1 in slots whose run has failed, (n,).

@@ -41,7 +41,7 @@ def driven(env: PendulumVectorEnv, law: Any, parts: Mapping[str, Part], watch: W
         ValueError: the law's force is not finite.
     """
     n, task = env.num_envs, env.task
-    loop = env.loop.with_parts(law=law.part(n), guard=guard(env.loop.xhat), **parts)
+    loop = env.loop.with_parts(law=law.part(n), guard=guard(env.loop), **parts)
     reference = np.empty((0, 4))
     if task.reference is not None:
         reference = Desired(task, task.reference).instants
@@ -111,10 +111,10 @@ def asked(
         observation, _, ended, _, info = env.step(action)
         loop.alive[:] = ~failed
         loop.x[:] = info["state"].T
-        loop.xhat[:] = estimate()
+        loop.xhat[:] = np.where(failed, loop.xhat, estimate()) if failures else estimate()
         loop.u[:] = info["force"]
         if "desired" in info:
-            reference[1:, :2] = info["desired"][0]
+            reference[1:, :2] = info["desired"][np.argmin(failed)]  # of a slot whose time goes on
         loop.run(0, 1, reference, recording=np.ascontiguousarray(info["positions"].transpose(1, 2, 0)))
         lost = diverged(observation) | info.get("estimate_failed", False)
         if hold is not None and np.count_nonzero(lost):

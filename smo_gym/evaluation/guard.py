@@ -3,12 +3,12 @@
 import numpy as np
 
 from ..kernels.blocks import FAILED, XHAT, Y, at, block, finite, four, offsets, put, put_four, two
-from ..loop import Part
+from ..loop import Loop, Part, columns
 from ..typing import Array
 
 DIVERGED = 1e4
 """An observer of poor gains can diverge while its plant goes on. No estimate in m, rad, m/s, rad/s comes near this."""
-START, _ = offsets(4)
+START, AT_Y, _ = offsets(4, 1)
 
 
 @block
@@ -16,15 +16,23 @@ def _guard(signals: Array, own: Array, lanes: int) -> None:
     for i in range(lanes):
         (h, theta), xhat, start = two(signals, Y, i), four(signals, XHAT, i), four(own, START, i)
         a, b, c, d = abs(xhat[0]), abs(xhat[1]), abs(xhat[2]), abs(xhat[3])
-        near = abs(h) < DIVERGED and abs(theta) < DIVERGED
-        fine = near and a < DIVERGED and b < DIVERGED and c < DIVERGED and d < DIVERGED
+        # "and" would branch, and a loop with so many branches is not vectorised
+        near = (abs(h) < DIVERGED) & (abs(theta) < DIVERGED)
+        fine = near & (a < DIVERGED) & (b < DIVERGED) & (c < DIVERGED) & (d < DIVERGED)
         put(signals, FAILED, i, at(signals, FAILED, i) if fine else 1.0)
-        put_four(signals, XHAT, i, xhat if finite(xhat) else start)
+        at_y = at(own, AT_Y, i) > 0.0
+        anew = h if at_y else start[0], theta if at_y else start[1], start[2], start[3]
+        put_four(signals, XHAT, i, xhat if finite(xhat) else anew)
 
 
-def guard(xhat: Array) -> Part:
-    """Fail runs whose estimate or measurement comes to :data:`DIVERGED`; what is not finite starts at ``xhat`` anew."""
-    return Part(xhat.copy(), close=_guard)
+def guard(loop: Loop) -> Part:
+    """Fail runs whose estimate or measurement comes to :data:`DIVERGED`; one that is not finite starts anew.
+
+    ``loop`` is at a start, with an observer.
+    """
+    each = loop.parts["observer"]
+    at_y = np.repeat([part.xhat is None for part in each], [part.rows.shape[1] for part in each])
+    return Part(columns(loop.n, loop.xhat, at_y[None]), close=_guard)
 
 
 def diverged(observation: Array) -> Array:

@@ -187,3 +187,8 @@ def register(meter: Meter) -> None:
 def names() -> list[str]:
     """All metrics' names, in the order of the tables."""
     return [metric.name for meter in METERS.values() for metric in meter.metrics]
+
+
+def registered() -> list[Metric]:
+    """The metrics that others have added."""
+    return [metric for meter in METERS.values() if meter is not USUAL for metric in meter.metrics]

@@ -119,11 +119,11 @@ def address(function: Block) -> int:
     if not COMPILES:
         _interpreted[id(function)] = function
         return id(function)
-    if not hasattr(function, "get_compile_result"):
+    if not hasattr(function, "overloads"):
         raise TypeError(f"{function!r} must be compiled: mark it with @smo_gym.kernels.blocks.block")
     compiled = cast(Any, function)
     compiled.compile(SIGNATURE.args)
-    found = compiled.get_compile_result(SIGNATURE)
+    found = compiled.overloads[SIGNATURE.args]
     if found.signature.return_type != types.void:
         raise TypeError(f"{function!r} must return nothing: a block writes into rows")
     return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))

@@ -5,10 +5,10 @@ import numpy as np
 from ..typing import Array
 from . import kernel
 from .batch import LANES, VECTOR, load, store
-from .blocks import ALIVE, FAILED, XD, Y0, X, Y, call
+from .blocks import ALIVE, FAILED, XD, XHAT, Y0, X, Y, call
 
 _LOOK = 16
-"""After every so many control periods a block of slots that have all ended is left."""
+"""After every so many control periods a block of slots is left that all had ended before: now their force is 0, too."""
 
 
 @kernel
@@ -42,13 +42,15 @@ def drive(
         recording: measurements in place of a sensor's, (substeps, 2, n), of a single period; or empty.
         positions: filled with the true positions of the last period, (substeps, 2, n); or empty.
     """
-    work = np.empty(rows.shape[0] * LANES)
+    work, kept = np.empty(rows.shape[0] * LANES), np.empty(4 * LANES)
     for first in range(start, stop, LANES):
         lanes = min(LANES, stop - first)
         # lanes that fill a vector repeat the first slot and are never stored: a scalar rest costs more
         width = lanes if lanes == 1 else (lanes + VECTOR - 1) // VECTOR * VECTOR
         load(work, 0, rows, first, lanes, width)
         for k in range(begin, end):
+            for i in range(4 * LANES):
+                kept[i] = work[XHAT * LANES + i]
             for p in range(acts):
                 call(program[p, 0], work, work[program[p, 1] * LANES : program[p, 2] * LANES], width)
             for j in range(substeps):
@@ -66,13 +68,19 @@ def drive(
                     store(work, X, positions[j], first, lanes)
             for p in range(acts + samples, program.shape[0]):
                 call(program[p, 0], work, work[program[p, 1] * LANES : program[p, 2] * LANES], width)
-            for i in range(width):
-                going = work[ALIVE * LANES + i]
-                work[ALIVE * LANES + i] = 0.0 if work[FAILED * LANES + i] > 0.0 else going
+            # an observer goes on in slots that have ended, for how long depends on the others: they show none of it
+            for r in range(4):
+                for i in range(width):
+                    xhat = work[(XHAT + r) * LANES + i]
+                    work[(XHAT + r) * LANES + i] = xhat if work[ALIVE * LANES + i] > 0.0 else kept[r * LANES + i]
+            alive = 1.0
             if k % _LOOK == 0:
                 alive = 0.0
                 for i in range(width):
                     alive += work[ALIVE * LANES + i]
-                if alive == 0.0:
-                    break
+            for i in range(width):
+                going = work[ALIVE * LANES + i]
+                work[ALIVE * LANES + i] = 0.0 if work[FAILED * LANES + i] > 0.0 else going
+            if alive == 0.0:
+                break
         store(work, 0, rows, first, lanes)

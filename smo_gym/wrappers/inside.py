@@ -9,13 +9,14 @@ from typing import Any, cast
 import gymnasium
 import numpy as np
 from gymnasium import spaces
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv, VectorEnv, VectorObservationWrapper, VectorWrapper
 
 from ..envs.pendulum import PendulumEnv
 from ..envs.task import Task, plain_data
 from ..envs.vector import PendulumVectorEnv
 from ..kernels.blocks import XHAT, Y
-from ..loop import Loop
+from ..loop import Loop, Part
 from ..observers import OBSERVERS, Estimator, Observer, Oracle, SlidingModeObserver, start_each
 from ..observers.estimator import parts_of
 from ..typing import Array, Flags
@@ -138,30 +139,49 @@ def at_work(env: Any, observers: Sequence[Observer]) -> Estimator:
     if ours and isinstance(layer, PendulumEnv | PendulumVectorEnv):
         parts = parts_of(observers, *plant)
         if parts is not None:
-            layer.plug(parts)
             sees = any(isinstance(observer, Oracle) for observer in observers)
-            return Oracular(layer.loop, observers) if sees else Plugged(layer.loop)
+            return Oracular(layer, parts, observers) if sees else Plugged(layer, parts)
     return start_each(observers, *plant)
 
 
 class Plugged:
-    """Observers that work inside of an environment's loop: stepping it has updated them."""
+    """Observers that work inside of an environment's loop: stepping it has updated them.
 
-    def __init__(self, loop: Loop) -> None:
-        self.loop = loop
+    There is room for the observers of one wrapper: another one around the same environment, once it is reset, takes it.
+    """
+
+    def __init__(self, env: PendulumEnv | PendulumVectorEnv, parts: Sequence[Part]) -> None:
+        self._env, self._parts = env, parts
+        self._plug()
+
+    def _plug(self) -> None:
+        self._env.plug(self._parts)
+        self.loop: Loop = self._env.loop
 
     @property
     def xhat(self) -> Array:
-        """The estimates (4, n), a copy."""
-        return self.loop.xhat.copy()
+        """The estimates (4, n), a copy.
+
+        Raises:
+            gymnasium.error.ResetNeeded: another wrapper's observers work in the environment since.
+        """
+        return self.observed[2:]
 
     @property
     def observed(self) -> Array:
-        """Measurements and estimates, (6, n), a copy."""
+        """Measurements and estimates, (6, n), a copy.
+
+        Raises:
+            gymnasium.error.ResetNeeded: as :attr:`xhat`.
+        """
+        if self._env.loop is not self.loop:
+            raise ResetNeeded("another observer was put around this environment: call reset() of this one's wrapper")
         return self.loop.rows[Y : XHAT + 4].copy()
 
     def reset(self, slots: Flags, y: Array) -> None:
         """Start the marked slots anew, where the loop's encoders are."""
+        if self._env.loop is not self.loop:
+            self._plug()
         self.loop.restart("observer", slots)
 
     def update(self, samples: Array, u: Array) -> None:
@@ -171,8 +191,10 @@ class Plugged:
 class Oracular(Plugged):
     """Some of the observers see the truth: at a reset, too, which the loop's blocks do not."""
 
-    def __init__(self, loop: Loop, observers: Sequence[Observer]) -> None:
-        super().__init__(loop)
+    def __init__(
+        self, env: PendulumEnv | PendulumVectorEnv, parts: Sequence[Part], observers: Sequence[Observer]
+    ) -> None:
+        super().__init__(env, parts)
         self._oracles = np.array([isinstance(observer, Oracle) for observer in observers])
 
     def see(self, slots: Flags, x: Array) -> None:

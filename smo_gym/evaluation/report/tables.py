@@ -91,17 +91,19 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
-    """What the runs showed beside their MSE: a table, and what the compensation costs."""
-    lines = (formats.escaped(line, form) for line in verdicts.costs(outcomes))
-    return "\n\n".join([_table(form, *diagnosed(outcomes)), *lines])
+    """What the runs showed beside their MSE: a table, what its registered metrics are, and what the compensation costs."""
+    lines = (*(f"{metric.name}: {metric.label}" for metric in metrics.registered()), *verdicts.costs(outcomes))
+    return "\n\n".join([_table(form, *diagnosed(outcomes)), *(formats.escaped(line, form) for line in lines)])
 
 
 def diagnosed(outcomes: Sequence[Outcome]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows of what the runs showed beside their MSE, a mean over each controller's runs that did not fail.
 
-    The last column counts the runs that left the operating set which the theorem's gains are designed for.
+    Registered metrics stand behind ours. The last column counts the runs that left the operating set which the
+    theorem's gains are designed for.
     """
-    header = ("table", "controller", "arm", *_DIAGNOSTICS.values(), "left the set")
+    shown = _DIAGNOSTICS | {metric.name: f"{metric.name}, {metric.unit}" for metric in metrics.registered()}
+    header = ("table", "controller", "arm", *shown.values(), "left the set")
     rows = []
     keys = dict.fromkeys((o.group.scenario.table, o.group.name) for o in outcomes)
     for table, controller in keys:
@@ -113,7 +115,7 @@ def diagnosed(outcomes: Sequence[Outcome]) -> tuple[tuple[str, ...], list[tuple[
                 and o.group.uncertainty > 0.0
             ]
             if chosen:
-                columns = [np.concatenate([o.metrics[name][~o.failed] for o in chosen]) for name in _DIAGNOSTICS]
+                columns = [np.concatenate([o.metrics[name][~o.failed] for o in chosen]) for name in shown]
                 means = [f"{values.mean():.3g}" if values.size else "" for values in columns]
                 left = [o.left for o in chosen if o.left is not None]
                 count = f"{np.concatenate(left).sum()} of {sum(map(len, left))}" if left else ""
