@@ -91,7 +91,7 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
-    """What the runs showed beside their MSE: a table, what its registered metrics are, and what the compensation costs."""
+    """What the runs showed beside their MSE: a table, its registered metrics, and what the compensation costs."""
     lines = (*(f"{metric.name}: {metric.label}" for metric in metrics.registered()), *verdicts.costs(outcomes))
     return "\n\n".join([_table(form, *diagnosed(outcomes)), *(formats.escaped(line, form) for line in lines)])
 
