@@ -20,12 +20,16 @@ x = np.array([[0.0], [1.0], [0.0], [0.0]])
 advance(x, CartPendulum().as_array()[:, None], np.zeros(1), 0.001, np.empty((10, 2, 1)))
 print(repr(float(x[3, 0])))
 """
+_LIGHT = """
+from smo_gym.plant import CartPendulum
+print(CartPendulum().drift([0.0, 1.0, 0.0, 0.0]).tolist())
+"""
 
 
-def _probe(cwd, **environment):
-    """The probe in a process of its own, whatever this one's surroundings say of Numba."""
+def _probe(cwd, probe=_PROBE, **environment):
+    """A probe in a process of its own, whatever this one's surroundings say of Numba."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-    command = [sys.executable, "-c", _PROBE]
+    command = [sys.executable, "-c", probe]
     return subprocess.run(command, cwd=cwd, check=True, capture_output=True, text=True, env=kept | environment)
 
 
@@ -40,6 +44,15 @@ def whole(tmp_path_factory):
     """A package, its cache in a folder beside it, and what a probe that filled the cache printed."""
     folder = _package(tmp_path_factory.mktemp("whole"))
     done = _probe(folder, NUMBA_CACHE_DIR=str(folder / "cache"))
+    assert done.stderr == ""
+    return folder, folder / "cache", done.stdout
+
+
+@pytest.fixture(scope="module")
+def light(tmp_path_factory):
+    """The same of a probe that needs a single small kernel."""
+    folder = _package(tmp_path_factory.mktemp("light"))
+    done = _probe(folder, _LIGHT, NUMBA_CACHE_DIR=str(folder / "cache"))
     assert done.stderr == ""
     return folder, folder / "cache", done.stdout
 
@@ -62,24 +75,24 @@ def test_a_change_of_the_equations_is_never_hidden_by_the_cache(tmp_path):
 
 @pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"", lambda data: b"\0" * 99])
 @pytest.mark.parametrize("kind", ["nbi", "nbc"])
-def test_a_damaged_cache_is_said_once_and_mended(whole, tmp_path, damage, kind):
-    folder, cache, printed = whole
+def test_a_damaged_cache_is_said_once_and_mended(light, tmp_path, damage, kind):
+    folder, cache, printed = light
     place = {"NUMBA_CACHE_DIR": str(shutil.copytree(cache, tmp_path / "cache"))}
     files = list(tmp_path.rglob(f"*.{kind}"))
     assert files
     for file in files:
         file.write_bytes(damage(file.read_bytes()))
-    damaged = _probe(folder, **place)
+    damaged = _probe(folder, _LIGHT, **place)
     assert damaged.stdout == printed
     assert damaged.stderr.count("compiled kernels cannot be cached or read back") == 1
-    again = _probe(folder, **place)
+    again = _probe(folder, _LIGHT, **place)
     assert (again.stdout, again.stderr) == (printed, "")
 
 
-def test_a_cache_that_cannot_be_written_is_no_failure(whole, tmp_path):
-    folder, _, printed = whole
+def test_a_cache_that_cannot_be_written_is_no_failure(light, tmp_path):
+    folder, _, printed = light
     (tmp_path / "file").write_text("")
-    done = _probe(folder, NUMBA_CACHE_DIR=str(tmp_path / "file" / "cache"))
+    done = _probe(folder, _LIGHT, NUMBA_CACHE_DIR=str(tmp_path / "file" / "cache"))
     assert done.stdout == printed
     assert done.stderr.count("compiled kernels cannot be cached") <= 1  # none where Numba finds another folder
 
