@@ -239,7 +239,8 @@ def test_a_full_disk_stops_no_study(groups, whole, tmp_path, monkeypatch):
         assert not [*kept.folder.iterdir()]
 
 
-def test_here_it_is_told_what_a_piece_has_done_before_it_is_done(groups):
+def test_here_it_is_told_what_a_piece_has_done_before_it_is_done(groups, monkeypatch):
+    monkeypatch.setattr("smo_gym.evaluation.drivers._SLOT_STEPS", 50)
     told = {}
     for mapped in (builtins.map, Counted()):
         told[mapped] = []
