@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from smo_gym.article import Cell, published
-from smo_gym.evaluation import statistics, study
+from smo_gym.evaluation import metrics, statistics, study
 from smo_gym.evaluation.report import tables
 
 
 def outcome(small, level, arm, values, failed=None):
     group = study.Group(small, "lqr", level, "", arm, len(values))
     values = np.array(values, dtype=float)
-    metrics = dict.fromkeys(tables.metrics.names(), values)
-    return study.Outcome(group, metrics, np.zeros(len(values), dtype=bool) if failed is None else np.array(failed))
+    each = dict.fromkeys(metrics.names(), values)
+    return study.Outcome(group, each, np.zeros(len(values), dtype=bool) if failed is None else np.array(failed))
 
 
 def find(results, **where):

@@ -240,7 +240,7 @@ def test_a_full_disk_stops_no_study(groups, whole, tmp_path, monkeypatch):
 
 
 def test_here_it_is_told_what_a_piece_has_done_before_it_is_done(groups, monkeypatch):
-    monkeypatch.setattr("smo_gym.evaluation.drivers._SLOT_STEPS", 100)
+    monkeypatch.setattr("smo_gym.evaluation.drivers._SLOT_STEPS", 50)
     told = {}
     for mapped in (builtins.map, Counted()):
         told[mapped] = []
