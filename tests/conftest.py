@@ -11,6 +11,7 @@ import pytest
 import smo_gym  # noqa: F401  registers the environments
 from smo_gym.evaluation import scenario
 from smo_gym.evaluation.arms import ARMS
+from smo_gym.evaluation.metrics import METERS
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ROOT / "configs"
@@ -23,13 +24,20 @@ def env_id(request):
     return request.param
 
 
+@pytest.fixture(autouse=True)
+def _registries():
+    """What a test, or a page that a test runs, has registered is forgotten after it."""
+    before = [(known, dict(known)) for known in (ARMS, METERS)]
+    yield
+    for known, was in before:
+        known.clear()
+        known.update(was)
+
+
 @pytest.fixture
 def registry():
-    """The arms, left as they were."""
-    known = dict(ARMS)
-    yield ARMS
-    ARMS.clear()
-    ARMS.update(known)
+    """The arms, which are left as they were."""
+    return ARMS
 
 
 @pytest.fixture

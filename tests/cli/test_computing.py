@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from smo_gym import cli
 from smo_gym.cli import computing, processes
 from smo_gym.cli.arguments import Parser
 from smo_gym.evaluation import store
@@ -203,6 +204,7 @@ def test_two_places_are_refused_and_a_cluster_needs_its_extra(tmp_path, monkeypa
         pass
     monkeypatch.setitem(sys.modules, "distributed", None)
     monkeypatch.delitem(sys.modules, "smo_gym.cli.cluster", raising=False)
+    monkeypatch.delattr(cli, "cluster", raising=False)  # which the import statement finds before
     args = parser.parse_args(["--dask", "tcp://127.0.0.1:1"])
     with pytest.raises(ImportError, match=r'pip install "smo_gym\[dask\]"'), computing.computing(args, tmp_path):
         pass
