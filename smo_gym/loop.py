@@ -89,6 +89,17 @@ def side_by_side(parts: Iterable[Part]) -> list[Part]:
     ]
 
 
+def runs_as_part(it: Any, otherwise: str) -> bool:
+    """Whether an object's ``part`` says what it does: its class says ``part`` no earlier than the method ``otherwise``.
+
+    A subclass that overrides the method alone means to do something else than its inherited part.
+    """
+    order = type(it).__mro__
+    places = [next((i for i, kind in enumerate(order) if name in vars(kind)), None) for name in ("part", otherwise)]
+    part, method = places
+    return part is not None and (method is None or part <= method) and callable(getattr(it, "part", None))
+
+
 class Loop:
     """n slots in closed loop.
 
@@ -224,10 +235,19 @@ class Loop:
         recording: Array = _NO_SAMPLES,
         positions: Array = _NO_SAMPLES,
     ) -> None:
-        """Drive whole control periods; arguments as of :func:`smo_gym.kernels.driver.drive`."""
+        """Drive whole control periods; arguments as of :func:`smo_gym.kernels.driver.drive`.
+
+        Raises:
+            ValueError: an array has another shape: compiled code does not look.
+        """
         end, substeps, rows = begin + periods, self.substeps, self.rows
-        for start, stop, program, acts, samples in self._sections:
-            told: Any = (rows, program, acts, samples, begin, end, substeps, reference, recording, positions)
+        for name, samples in (("recording", recording), ("positions", positions)):
+            if samples is not _NO_SAMPLES and samples.shape != (substeps, 2, self.n):
+                raise ValueError(f"{name} has shape {samples.shape}, it must have shape {(substeps, 2, self.n)}")
+        if (len(reference) and reference.shape != (len(reference), 4)) or 0 < len(reference) <= end * substeps:
+            raise ValueError(f"reference has shape {reference.shape}, it must have {end * substeps + 1} rows of 4")
+        for start, stop, program, acts, each in self._sections:
+            told: Any = (rows, program, acts, each, begin, end, substeps, reference, recording, positions)
             if stop - start <= LANES:
                 drive(start, stop, *told)
             else:

@@ -43,6 +43,11 @@ class Feedback:
     memory: ClassVar[int] = 0
     _alone: Loop | None = None
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """A law whose settings change is another one."""
+        super().__setattr__(name, value)
+        vars(self)["_alone"] = None if name != "_alone" else value
+
     def part(self, n: int) -> Part:
         """What the law puts into a loop of n slots.
 

@@ -44,6 +44,7 @@ class LQR(Feedback):
         if shape is None or shape[-1:] != (4,) or len(shape) > 2:
             raise ValueError(f"K has shape {shape}, it must have shape (4,) or (n, 4)")
         self.K = np.atleast_2d(array("K", K, shape))
+        self.K.flags.writeable = False
         self.wrap = switch("wrap", wrap)
 
     @classmethod

@@ -84,8 +84,8 @@ class SlidingModeController(Feedback):
         self.lam = number("lam", lam, above=0.0)
         self.epsilon = number("epsilon", epsilon, above=0.0)
         self.wrap = switch("wrap", wrap)
-        rows = [self.k, np.broadcast_to(np.minimum(self.slope, 1e300)[..., None], (*shape[:-1], 1))]  # 1e300: sgn
-        self._gains = np.atleast_2d(np.concatenate(rows, axis=-1))
+        for gains in (self.k, self.slope):
+            gains.flags.writeable = False
 
     def part(self, n: int) -> Part:
         """What the law puts into a loop of n slots.
@@ -93,10 +93,11 @@ class SlidingModeController(Feedback):
         Raises:
             ValueError: k has another number of slots.
         """
-        if len(self._gains) not in (1, n):
-            raise ValueError(f"k has {len(self._gains)} slots, the observation has {n}")
+        k, slope = np.atleast_2d(self.k), np.atleast_1d(np.minimum(self.slope, 1e300))  # as good as sgn
+        if len(k) not in (1, n):
+            raise ValueError(f"k has {len(k)} slots, the observation has {n}")
         settings = (self.Z0, self.lam, math.pi / self.epsilon, self.dt, float(self.wrap))
-        return Part(columns(n, 0.0, self._gains.T, *settings), act=_act)
+        return Part(columns(n, 0.0, k.T, slope[None], *settings), act=_act)
 
     def __repr__(self) -> str:
         settings = {name: getattr(self, name) for name in ("dt", "slope", "Z0", "lam", "epsilon")}

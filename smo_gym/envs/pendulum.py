@@ -222,7 +222,7 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
             "params": self._params.copy(),
             "force": force,
             "positions": samples,
-            "samples": samples,
+            "samples": samples.copy(),
         }
         if self._desired is not None:
             info["desired"] = self._desired.positions[k].copy()

@@ -258,7 +258,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
             "_force": everywhere,
             "positions": told,
             "_positions": everywhere,
-            "samples": told,
+            "samples": samples.copy().transpose(2, 0, 1),
             "_samples": everywhere,
         }
         if self._desired is not None:

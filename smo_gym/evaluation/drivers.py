@@ -17,6 +17,7 @@ from ..kernels.blocks import X, Y, block, put_two, two
 from ..loop import Loop, Part
 from ..typing import Array
 from ..wrappers import VectorObserverWrapper
+from ..wrappers.inside import as_they_are
 from .guard import diverged, guard
 from .traces import Watch
 
@@ -30,8 +31,7 @@ def loop_inside(env: VectorEnv[Array, Array, Array]) -> PendulumVectorEnv | None
     inner = env.unwrapped
     if not isinstance(env, VectorObserverWrapper) or not env.plugged or env.env is not inner:
         return None
-    ours = isinstance(inner, PendulumVectorEnv) and type(inner).step is PendulumVectorEnv.step
-    return inner if ours else None  # type: ignore[return-value]
+    return inner if as_they_are(env, VectorObserverWrapper) else None  # type: ignore[return-value]
 
 
 def driven(env: PendulumVectorEnv, law: Any, parts: Mapping[str, Part], watch: Watch) -> Loop:
@@ -41,7 +41,11 @@ def driven(env: PendulumVectorEnv, law: Any, parts: Mapping[str, Part], watch: W
         ValueError: the law's force is not finite.
     """
     n, task = env.num_envs, env.task
-    loop = env.loop.with_parts(law=law.part(n), guard=guard(env.loop), **parts)
+    try:
+        part = law.part(n)
+    except Exception as error:  # whatever a user's law may raise
+        raise ValueError(f"{title(law)}: cannot act on {n} plants ({type(error).__name__}: {error})") from error
+    loop = env.loop.with_parts(law=part, guard=guard(env.loop), **parts)
     reference = np.empty((0, 4))
     if task.reference is not None:
         reference = Desired(task, task.reference).instants
@@ -108,7 +112,7 @@ def asked(
         first = later
         if failures:
             action = np.where(failed[:, None], 0.0, action)
-        observation, _, ended, _, info = env.step(action)
+        observation, loop.reward[:], ended, _, info = env.step(action)
         loop.alive[:] = ~failed
         loop.x[:] = info["state"].T
         loop.xhat[:] = np.where(failed, loop.xhat, estimate()) if failures else estimate()

@@ -14,7 +14,7 @@ import numpy as np
 from ..kernels import inlined
 from ..kernels.batch import LANES
 from ..kernels.blocks import ALIVE, XD, XHAT, Block, U, X, at, block, four, offsets
-from ..loop import Part, columns
+from ..loop import ROLES, Part, columns
 from ..plant import STATE_NAMES
 from ..typing import Array
 
@@ -39,6 +39,10 @@ class Meter:
         finish: from its rows (rows, n) and the control period in s to one row a metric, (metrics, n).
         sample: block that is called at every sampling instant.
         close: block that is called when a control period ends. Both must leave runs alone whose row ALIVE is 0.
+
+    At a sampling instant a meter may read positions and their references, rows X, X + 1, XD and XD + 1, and the force;
+    at the end of a control period the whole state, the estimate, the force and the reward. Where an agent is asked once
+    a control period, nothing else is known at those instants.
     """
 
     name: str
@@ -177,6 +181,8 @@ def register(meter: Meter) -> None:
     Raises:
         ValueError: its name or that of a metric is taken.
     """
+    if meter.name in (*ROLES, "forces"):
+        raise ValueError(f"a meter cannot be named {meter.name!r}: a part of every loop is")
     if meter.name in METERS:
         raise ValueError(f"a meter {meter.name!r} is registered already")
     if taken := {metric.name for metric in meter.metrics} & {*names()}:

@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from ..controllers import Agent
 from ..envs.task import Task
+from ..loop import runs_as_part
 from ..typing import Array, Flags
 from . import metrics
 from .drivers import asked, driven, loop_inside
@@ -71,7 +72,7 @@ def rollout(
         parts["forces"] = forces(n)
     observation, info = env.reset(seed=seed, options=dict(options or {}))
     inner = None if "steps" in (options or {}) else loop_inside(env)  # these episodes do not end together
-    if inner is not None and hasattr(agent, "part"):
+    if inner is not None and runs_as_part(agent, "predict"):
         loop = driven(inner, agent, parts, watch)
     else:
         loop = asked(env, agent, observation, info, parts, watch)

@@ -86,7 +86,7 @@ class Store:
                     policy = [_hash(path), _hash(path.with_suffix(".json"))]
                 except OSError:  # who loads it will name it
                     return None
-        reference = scenario.trajectory()
+        reference, spec = scenario.trajectory(), gymnasium.spec(scenario.environment)
         told = {
             "scenario": scenario.model_dump(mode="json", exclude={"controllers"}),
             "reference": None if reference is None else reference.to_json(),
@@ -94,6 +94,7 @@ class Store:
             "group": [group.controller, group.uncertainty, group.case, group.arm, group.runs],
             "study": [seed, samples],
             "policy": policy,
+            "environment": [str(spec.entry_point), str(spec.vector_entry_point), spec.max_episode_steps],
         }
         return digest(told)
 

@@ -14,6 +14,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from ..envs.task import Task
+from ..loop import runs_as_part
 from ..observers import Compiled, Observer
 from ..plant import STATE_NAMES
 from ..typing import Array, Flags
@@ -234,7 +235,7 @@ def _observers(wanted: Iterable[Group]) -> list[Hashable]:
 
 def _kind(observer: Observer) -> Hashable:
     """Compiled observers of all kinds share a batch; others, asked once a control period, are alone in theirs."""
-    return Compiled if isinstance(observer, Compiled) else id(observer)
+    return Compiled if runs_as_part(observer, "start") else id(observer)
 
 
 def simulated_seconds(wanted: Iterable[Group]) -> float:

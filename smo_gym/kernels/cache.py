@@ -10,8 +10,8 @@ from numba.core.caching import FunctionCache
 
 
 def _digest() -> str:
-    """Hash of all sources that other files' kernels inline."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
+    """Hash of the package's sources: any of them may stand in what a kernel inlines."""
+    sources = sorted(Path(__file__).parents[1].rglob("*.py"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in sources)).hexdigest()
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import groupby
+from typing import cast
 
 import numpy as np
 
-from ..loop import Loop, Part, side_by_side
+from ..loop import Loop, Part, runs_as_part, side_by_side
 from ..plant import CartPendulum
 from ..typing import Array, Flags
 from .protocol import Compiled, Estimator, Observer
@@ -89,9 +90,9 @@ def parts_of(observers: Sequence[Observer], dt: float, force: float, nominal: Ca
         ValueError: an observer cannot work with these.
     """
     runs = _runs(observers)
-    if not all(isinstance(observer, Compiled) for observer, _ in runs):
+    if not all(runs_as_part(observer, "start") for observer, _ in runs):
         return None
-    return side_by_side(observer.part(n, dt, force, nominal) for observer, n in runs if isinstance(observer, Compiled))
+    return side_by_side(cast(Compiled, observer).part(n, dt, force, nominal) for observer, n in runs)
 
 
 def start_each(observers: Sequence[Observer], dt: float, force: float, nominal: CartPendulum) -> Estimator:
@@ -100,9 +101,10 @@ def start_each(observers: Sequence[Observer], dt: float, force: float, nominal: 
     Raises:
         ValueError: an observer cannot work with these.
     """
-    parts = parts_of(observers, dt, force, nominal)
-    if parts is not None:
-        return BlockEstimator(parts, len(observers))
+    if all(isinstance(observer, Compiling) for observer in observers):  # others have estimators of their own
+        parts = parts_of(observers, dt, force, nominal)
+        if parts is not None:
+            return BlockEstimator(parts, len(observers))
     each: list[tuple[slice, Estimator]] = []
     start = 0
     for observer, n in _runs(observers):

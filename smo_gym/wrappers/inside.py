@@ -120,6 +120,11 @@ def space_of(inner: spaces.Space[Any]) -> spaces.Space[Array]:
     return spaces.Box(-np.inf, np.inf, (*inner.shape[:-1], inner.shape[-1] + 4), np.float64)
 
 
+def as_they_are(it: Any, kind: type) -> bool:
+    """Whether an object is of a kind, and its class has left ``step`` and ``reset`` alone."""
+    return isinstance(it, kind) and all(getattr(type(it), name) is vars(kind)[name] for name in ("step", "reset"))
+
+
 def at_work(env: Any, observers: Sequence[Observer]) -> Estimator:
     """Observers, one a slot, at work on an environment: inside of its loop where they are compiled and it has one.
 
@@ -136,7 +141,8 @@ def at_work(env: Any, observers: Sequence[Observer]) -> Estimator:
     while isinstance(layer, gymnasium.Wrapper | VectorWrapper):
         ours &= type(layer).__module__.startswith("gymnasium.")
         layer = layer.env
-    if ours and isinstance(layer, PendulumEnv | PendulumVectorEnv):
+    ours &= as_they_are(layer, PendulumEnv) or as_they_are(layer, PendulumVectorEnv)
+    if ours:
         parts = parts_of(observers, *plant)
         if parts is not None:
             sees = any(isinstance(observer, Oracle) for observer in observers)
@@ -181,6 +187,8 @@ class Plugged:
     def reset(self, slots: Flags, y: Array) -> None:
         """Start the marked slots anew, where the loop's encoders are."""
         if self._env.loop is not self.loop:
+            if not slots.all():
+                raise ResetNeeded("another observer was put around this environment: call reset() of all slots")
             self._plug()
         self.loop.restart("observer", slots)
 

@@ -62,6 +62,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         self.plugged = isinstance(self._estimator, Plugged)
         self._mode = env.metadata["autoreset_mode"]
         self._over, self._any_over = np.zeros(n, dtype=np.bool_), False
+        self._held = self._estimator.xhat
         self._none, self._every = np.zeros(n, dtype=np.bool_), np.ones(n, dtype=np.bool_)
         for shared in (self._none, self._every):
             shared.flags.writeable = False  # infos share them
@@ -93,6 +94,9 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
             if self._see is not None:
                 self._see(self._every, last["state"].T)
         xhat = self._estimator.xhat
+        if not self.plugged and self._any_over and self._mode is AutoresetMode.DISABLED:
+            xhat[:, self._over] = self._held[:, self._over]  # an ended slot's estimate holds still, as inside of a loop
+        self._held = xhat
         lost = lost_of(xhat)
         if lost is not None:
             self._restart(lost, last["samples"][:, -1], last)
@@ -115,7 +119,7 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
             self._see(slots, info["state"].T)
 
     def _append(self, observation: Array, info: dict[str, Any], xhat: Array, failed: Flags) -> Array:
-        if not self.plugged and np.count_nonzero(observation[:, :2] != info["samples"][:, -1]):
+        if np.count_nonzero(observation[:, :2] != info["samples"][:, -1]):
             raise unseen(observation[:, :2], info["samples"][:, -1])
         info["estimate_failed"], info["_estimate_failed"] = failed, self._every
         self._show(xhat)
