@@ -241,10 +241,11 @@ class Loop:
             ValueError: an array has another shape: compiled code does not look.
         """
         end, substeps, rows = begin + periods, self.substeps, self.rows
-        for name, samples in (("recording", recording), ("positions", positions)):
-            if samples is not _NO_SAMPLES and samples.shape != (substeps, 2, self.n):
-                raise ValueError(f"{name} has shape {samples.shape}, it must have shape {(substeps, 2, self.n)}")
-        if (len(reference) and reference.shape != (len(reference), 4)) or 0 < len(reference) <= end * substeps:
+        if positions is not _NO_SAMPLES and positions.shape != (substeps, 2, self.n):
+            raise ValueError(f"positions has shape {positions.shape}, it must have shape {(substeps, 2, self.n)}")
+        if recording is not _NO_SAMPLES and recording.shape != (substeps, 2, self.n):
+            raise ValueError(f"recording has shape {recording.shape}, it must have shape {(substeps, 2, self.n)}")
+        if len(reference) and (len(reference) <= end * substeps or reference.shape[1:] != (4,)):
             raise ValueError(f"reference has shape {reference.shape}, it must have {end * substeps + 1} rows of 4")
         for start, stop, program, acts, each in self._sections:
             told: Any = (rows, program, acts, each, begin, end, substeps, reference, recording, positions)

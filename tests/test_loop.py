@@ -259,3 +259,14 @@ def test_without_a_compiler_the_bits_are_the_same():
     compiled = probe()
     assert compiled.count("\n") == 6
     assert probe(NUMBA_DISABLE_JIT="1") == compiled
+
+
+def test_arrays_of_another_shape_are_refused_before_compiled_code_reads_them():
+    estimator = SlidingModeObserver().start(16, 0.001, 30.0, CartPendulum())
+    with pytest.raises(ValueError, match=r"recording has shape \(5, 2, 1\), it must have shape \(5, 2, 16\)"):
+        estimator.update(np.zeros((5, 2, 1)), np.zeros(16))
+    loop = Loop(2, 3, {})
+    with pytest.raises(ValueError, match=r"positions has shape \(2, 2, 2\), it must have shape \(3, 2, 2\)"):
+        loop.run(positions=np.zeros((2, 2, 2)))
+    with pytest.raises(ValueError, match="it must have 7 rows of 4"):
+        loop.run(0, 2, reference=np.zeros((6, 4)))
