@@ -32,7 +32,7 @@ def closed_loop(controller: str, n: int, control_period: float = DT) -> Loop:
     return inner.loop.with_parts(
         law=settings.build(control_period).part(n),
         plant=moving(params, DT),
-        guard=guard(inner.loop.xhat),
+        guard=guard(inner.loop),
         metrics=USUAL.part(n),
     )
 
