@@ -16,6 +16,7 @@ from numba import types
 from ..typing import Array, State
 from . import COMPILES, inlined, instruction, kernel
 from .batch import LANES
+from .elementary import rounded
 
 Block = Callable[[Array, Array, int], None]
 
@@ -83,7 +84,6 @@ def finite(values: State) -> bool:
 
 
 _TWO_PI = 6.283185307179586
-_ROUND = 6755399441055744.0  # adding 1.5 * 2**52 and taking it away rounds to a whole number
 
 
 @inlined
@@ -95,7 +95,7 @@ def error(signals: Array, i: int, wrap: float) -> State:
     """
     xhat, x_d = four(signals, XHAT, i), four(signals, XD, i)
     angle = xhat[1] - x_d[1]
-    turns = wrap * ((angle / _TWO_PI + _ROUND) - _ROUND)
+    turns = wrap * rounded(angle / _TWO_PI)
     return xhat[0] - x_d[0], angle - _TWO_PI * turns, xhat[2] - x_d[2], xhat[3] - x_d[3]
 
 

@@ -54,6 +54,12 @@ def _from_bits(typingctx: Any, n: Any) -> Any:
 
 
 @inlined
+def rounded(x: float) -> float:
+    """The whole number next to x, the even one of two that are as near, for ``|x| < 2**51``."""
+    return (x + _ROUND) - _ROUND
+
+
+@inlined
 def sincos(x: float) -> tuple[float, float]:
     """``(sin x, cos x)``: x = r + q pi/2 with ``|r| <= pi/4``; q mod 4 says which polynomial serves and its sign."""
     shifted = fma(x, _TWO_OVER_PI, _ROUND)
