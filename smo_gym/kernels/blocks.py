@@ -106,7 +106,7 @@ _interpreted: dict[int, Block] = {}
 def block(function: Block) -> Block:
     """Compile a block; cached on disk like a kernel, where its file can be written beside.
 
-    The cache is made anew when that file or this package changes. What a block of your own inlines belongs into its file:
+    The cache is made anew when that file or this package changes. What a block of your own inlines belongs in its file:
     a change in another one of yours is not seen.
     """
     return kernel(function)
