@@ -19,7 +19,8 @@ COMMANDS = {
     "consistency": "the article's averages and reductions against its own cells",
     "identify": "recover what the article does not print",
     "reference": "the minimum-energy reference of the tracking scenario",
-    "animate": "a run as a GIF or WebP",
+    "watch": "a run of any controller, in a window or as a GIF, WebP or MP4",
+    "animate": "a run of LQR or SMC as a GIF or WebP",
 }
 """What each command does, in a line, by its name."""
 

@@ -104,8 +104,8 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
 
     With the extra `render` (pygame-ce). Cart, rod and bob as they are, of this episode's rod length; the force as an
     arrow, one and a half rods long at the limit (at 30 N without one); the reference in green; and under
-    :class:`smo_gym.ObserverWrapper` the estimate as a ghost in blue. The frame goes along with a cart that leaves its
-    middle. `metadata["render_fps"]` is that of real time, one frame a control period.
+    :class:`smo_gym.ObserverWrapper` the estimate as a ghost in blue, both with the same rod. The frame goes along with
+    a cart that leaves its middle. `metadata["render_fps"]` is that of real time, one frame a control period.
 
     Raises:
         ValueError: an option is unknown or its value is not allowed; an action of another shape or not finite.

@@ -89,6 +89,12 @@ def load() -> Any:
     return pygame
 
 
+def closed_by_user() -> bool:
+    """Whether somebody has asked a window to close since it was opened."""
+    pg = load()
+    return bool(pg.display.get_init() and pg.event.peek(pg.QUIT))
+
+
 class Renderer:
     """Draws scenes of a task.
 
@@ -216,10 +222,9 @@ class Renderer:
         pg.draw.circle(canvas, BOB, end, 1.4 * u)
 
     def _outline(self, canvas: pygame.Surface, scene: Scene, position: Array, colour: str) -> None:
-        """A cart pendulum that is not there, with the nominal rod."""
+        """A cart pendulum that is not there, with this episode's rod: what differs from the plant is h and theta."""
         pg, u = self._pygame, self._unit
-        cart = self._cart(scene, position)
-        end = self._at(scene, bob(self._task, position, self._task.params.rod_length))
+        cart, end = self._cart(scene, position), self._at(scene, bob(self._task, position, scene.rod))
         pg.draw.rect(canvas, colour, cart, round(0.35 * u), border_radius=round(0.7 * u))
         pg.draw.line(canvas, colour, cart.center, end, round(0.35 * u))
         pg.draw.circle(canvas, colour, end, 1.4 * u, round(0.35 * u))

@@ -6,6 +6,13 @@ from pathlib import Path
 
 from ..validation import choice
 
+OF_ENVIRONMENT = {
+    "SMOPendulum-v0": "initial-conditions",
+    "SMOPendulumUpright-v0": "upright",
+    "SMOPendulumTracking-v0": "tracking",
+}
+"""The scenario that an environment's own LQR and initial states stand in, by name."""
+
 
 def folder() -> Path:
     """The folder of these files: inside an installed package, beside the package in a checkout."""

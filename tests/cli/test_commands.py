@@ -16,7 +16,18 @@ from smo_gym.cli.commands import COMMANDS
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
 MODULE = [sys.executable, "-m", "smo_gym"]
-SHARED = {"arguments", "cluster", "commands", "computing", "console", "entry", "processes", "progress", "starting"}
+SHARED = {
+    "arguments",
+    "cluster",
+    "commands",
+    "computing",
+    "console",
+    "entry",
+    "processes",
+    "progress",
+    "recording",
+    "starting",
+}
 posix = pytest.mark.skipif(os.name != "posix", reason="of POSIX systems")
 
 
