@@ -210,7 +210,9 @@ class Renderer:
             x, _ = self._at(scene, (0.5 * k, 0.0))
             pg.draw.line(canvas, _PALE, (x, floor), (x, floor + 0.8 * u), round(0.2 * u))
             label = self._small.render(f"{0.5 * k:g} m", True, "#5A6470")
-            canvas.blit(label, label.get_rect(midtop=(x, floor + u)))
+            place = label.get_rect(midtop=(x, floor + u))
+            if canvas.get_rect().contains(place):
+                canvas.blit(label, place)
 
     def _pendulum(self, canvas: pygame.Surface, scene: Scene) -> None:
         pg, u = self._pygame, self._unit
