@@ -102,8 +102,8 @@ def _force(arms: Mapping[str, Sequence[Outcome]]) -> Number:
     effort, peak = _means("effort", arms), _means("peak_force", arms)
     both = len(effort) == 2
     return Number(
-        "Its cost: effort ∫F² dt, without → with" if both else "Effort ∫F² dt",
-        f"{' → '.join(map(_plain, effort))} N² s",
+        "Its cost: effort in N² s, without → with" if both else "Effort ∫F² dt in N² s",
+        " → ".join(map(_plain, effort)),
         f"{effort[1] / effort[0]:.1f} times" if both and effort[0] > 0.0 else "",
         f"mean peak force {' → '.join(map(_plain, peak))} N",
     )
