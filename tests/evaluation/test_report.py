@@ -1,5 +1,6 @@
 """The report: one file that shows what was measured, without a browser and in one."""
 
+import dataclasses
 import json
 import math
 import sys
@@ -12,7 +13,7 @@ from smo_gym import files
 from smo_gym.cli.evaluate import main
 from smo_gym.evaluation import scenario, statistics, study
 from smo_gym.evaluation.report import page as report
-from smo_gym.evaluation.report import page_traces, tables
+from smo_gym.evaluation.report import page_numbers, page_traces, tables
 
 EVIL = """</script><img src=x onerror="window.hacked = 1">&amp;"""
 
@@ -97,6 +98,58 @@ def test_every_cell_is_a_row_with_its_numbers(page):
             assert any(ratio in shown[7] and shown[9] == expected[7] for shown in found), result
         else:
             assert expected in rows
+
+
+def test_the_page_begins_with_what_the_compensation_does(page):
+    outcomes, results, text = page
+    effects = page_numbers.effects(outcomes, results)
+    assert [(effect.table, effect.over) for effect in effects] == [("4", "average"), ("7", "average")]
+    for effect, (_, rows) in zip(effects, tables.by_table(results).items(), strict=True):
+        averages = [r for r in rows if r.cell.is_average and r.cell.metric == tables.REDUCTION]
+        for number, result in zip(effect.numbers, averages, strict=False):
+            assert number.text == f"{result.measured:.1f} %".replace("-", "−")
+            assert number.text in text
+    assert [number.beside for number in effects[1].numbers[:2]] == ["93.5 % published", "24.2 % published"]
+    tracking = [o for o in outcomes if o.group.scenario.table == "7" and o.group.uncertainty > 0.0]
+    without, compensated = (o.metrics["effort"].mean() for o in tracking)
+    assert effects[1].numbers[2].text == f"{without:,.0f} → {compensated:,.0f}"
+    assert text.index("What the compensation does") < text.index("The score") < text.index("Watch a run</h2>")
+
+
+def test_one_arm_begins_with_its_errors():
+    groups = study.groups([load("regulation", horizon=0.1, uncertainty=(0.05,))], ["lqr"], ["oracle"], 2)
+    outcomes = study.measure(groups, seed=0, samples=10)
+    results = statistics.results(outcomes)
+    [effect] = page_numbers.effects(outcomes, results)
+    assert effect.numbers[0].name == "MSE of h, true state"
+    assert [number.beside for number in effect.numbers] == ["nothing published", "nothing published", ""]
+    assert page_numbers.score(results) is None
+    text = report.render(outcomes, results, "", {"smo_gym": "1.2.3"})
+    assert "What was measured" in text
+    assert "The score" not in text
+
+
+def test_the_score_counts_cells_beside_the_ceiling(page):
+    score = page_numbers.score(page[1])
+    assert f"{score.cells} published MSE cells in all: {score.near} within 10 %" in tables.summary(page[1])
+    assert math.isnan(score.ceiling)  # from three runs
+    assert "takes more than ten runs" in page[2]
+    sure = [dataclasses.replace(result, ceiling=0.5) for result in page[1]]
+    assert page_numbers.score(sure).ceiling == 0.5 * score.cells
+
+
+@pytest.mark.parametrize("value", [-0.04, -0.0])
+def test_nothing_is_minus_zero(value):
+    assert page_numbers._percent(value) == "0.0 %"
+
+
+def test_diagnostics_are_a_table_for_each_controller_and_a_column_for_each_arm(page):
+    header, rows = tables.diagnosed(page[0])
+    blocks = report._diagnosed(page[0])
+    assert [block["arms"] for block in blocks] == [("without", "with")] * 2
+    efforts = [[float(text.replace(",", "")) for text in dict(block["rows"])["effort, N² s"]] for block in blocks]
+    column = header.index("effort, N^2 s")
+    assert np.ravel(efforts).tolist() == [float(row[column]) for row in rows]
 
 
 def test_settings_stand_with_their_sources(page):

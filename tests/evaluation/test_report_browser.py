@@ -137,6 +137,7 @@ def test_curves_and_readings_are_the_measured_runs(opened, report):
         seek(page, traces.time[10])
         readings = page.locator(".readout tbody tr").first.locator("td").all_inner_texts()
         shown = [float(text.replace("\u2212", "-")) for text in readings[:4]]
+        assert not any(re.fullmatch(r"[-\u2212]0\.0*", text) for text in readings)
         np.testing.assert_allclose(shown, traces.x[10, :, 2], atol=6e-4 + 1e-4 * np.ptp(traces.x[..., 2]))
 
 
@@ -167,6 +168,69 @@ def test_no_button_sends_a_figure_away(opened):
         titles = page.locator(f"{plot} .modebar-btn").evaluate_all("all => all.map((one) => one.dataset.title)")
         assert len(titles) == 6
         assert not re.search("share|cloud|edit|upload", " ".join(titles), re.IGNORECASE)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1440, 390])
+def test_nothing_is_in_the_way_of_anyone(opened, scheme, width):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    page = opened(color_scheme=scheme, viewport={"width": width, "height": 900})
+    page.check("#display [name=arms]")
+    page.wait_for_selector("#curves-key li:nth-child(3)")
+    found = axe.Axe().run(page).response["violations"]
+    assert [(fault["id"], fault["impact"]) for fault in found] == []
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    wide, inside = page.evaluate(
+        "(({ scrollWidth, clientWidth }) => [scrollWidth, clientWidth])(document.querySelector('.diagnostics'))"
+    )
+    assert wide == inside
+
+
+def test_a_filter_that_nothing_passes_says_so(opened):
+    page = opened()
+    assert not page.is_visible("#none")
+    page.select_option("#filter [name=controller]", "lqr")
+    page.fill("#filter [name=text]", "no such row")
+    assert "No cells match" in page.inner_text("#none")
+    assert not page.is_visible(".cells")
+    page.click("#none button")
+    page.wait_for_selector(".cells tr[data-arm]")
+    assert not page.is_visible("#none")
+    assert page.input_value("#filter [name=controller]") == page.input_value("#filter [name=text]") == ""
+
+
+def test_a_law_is_kept_from_table_to_table(opened):
+    page = opened()
+    for table, controller, tracking in (("none", "smc", "smc-tracking"), ("4", "lqr", "lqr-tracking")):
+        choose(page, table, controller)
+        page.select_option("#choice [name=table]", index=1)
+        assert page.input_value("#choice [name=controller]") == tracking
+
+
+def test_space_plays_wherever_it_has_no_other_use(opened):
+    page = opened()
+    for place in ("body", "#slider", ".diagnostics"):
+        page.eval_on_selector(place, "it => { it.focus(); if (it === document.body) document.activeElement.blur(); }")
+        page.keyboard.press("Space")
+        assert page.get_attribute("#play", "aria-label") == "Pause"
+        page.keyboard.press("Space")
+        assert page.get_attribute("#play", "aria-label") == "Play"
+    page.focus("#filter [name=text]")
+    page.keyboard.press("Space")
+    assert page.input_value("#filter [name=text]") == " "
+    page.focus("#display [name=runs]")
+    page.keyboard.press("Space")
+    assert page.is_checked("#display [name=runs]")
+    assert page.get_attribute("#play", "aria-label") == "Play"
+
+
+def test_the_first_numbers_are_those_of_the_chosen_table(opened):
+    page = opened()
+    chosen = page.locator(".effect:visible")
+    assert chosen.count() == 1
+    page.select_option("#effects-of", "Table 7, SMC-TRACKING")
+    assert "Table 7, SMC-TRACKING" in chosen.inner_text()
+    assert chosen.locator("strong").count() == 3
 
 
 def test_filters_change_the_tables(opened, report):

@@ -21,7 +21,7 @@ from .. import formats
 from ..arms import ARMS
 from ..statistics import Result, place
 from ..study import Group, Outcome
-from . import page_figures, tables
+from . import page_figures, page_numbers, tables
 from .page_traces import CHANNELS, LEVELS, pack, runs_that_fit
 from .panels import WINDOW
 from .provenance import sources
@@ -72,7 +72,6 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
     runs = runs_that_fit(outcomes)
     places, packed = pack(outcomes, runs)
     groups = [_group(outcome, where) for outcome, where in zip(outcomes, places, strict=True)]
-    header, diagnosed = tables.diagnosed(outcomes)
     settings = sources(outcomes)
     figures = {
         "curves": page_figures.curves(),
@@ -92,6 +91,8 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
             "groups": groups,
         },
         figures=Markup(_json(figures)),
+        effects=page_numbers.effects(outcomes, results),
+        score=page_numbers.score(results),
         summary=tables.summary(results),
         runs=sum(len(outcome.failed) for outcome in outcomes),
         failed=sum(int(outcome.failed.sum()) for outcome in outcomes),
@@ -101,8 +102,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         bars=list(figures["bars"]),
         arms={arm.name: arm.title for arm in ARMS.values() if any(o.group.arm == arm.name for o in outcomes)},
         rms=any(r.cell.metric == "rms" for r in results),
-        header=header,
-        diagnosed=diagnosed,
+        diagnosed=_diagnosed(outcomes),
         settings=settings,
         sources=Counter(row["source"] for row in settings),
         window=WINDOW,
@@ -135,6 +135,7 @@ def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
         "title": formats.line(group.scenario.title),
         "controller": formats.line(group.name),
         "name": tables.title(group.name),
+        "law": group.settings.law,
         "uncertainty": f"{100 * group.uncertainty:.10g} %",
         "case": formats.line(group.case),
         "start": [float(value) for value in group.scenario.initial_states.value[group.case]],
@@ -180,6 +181,30 @@ def _tables(outcomes: Sequence[Outcome], results: Iterable[Result]) -> list[dict
             }
         )
     return found
+
+
+def _diagnosed(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """The diagnostics of each table and controller, a row a metric and a column an arm: as wide as a phone."""
+    (_, _, _, *names), rows = tables.diagnosed(outcomes)
+    blocks: dict[str, list[tuple[str, ...]]] = {}
+    for table, controller, *column in rows:
+        blocks.setdefault(f"Table {table}, {controller}", []).append(tuple(column))
+    found = []
+    for title, columns in blocks.items():
+        arms, *metrics = zip(*columns, strict=True)
+        named = zip(map(_typeset, names), metrics, strict=True)
+        values = [(name, [_in_full(value) for value in row]) for name, row in named if any(row)]
+        found.append({"title": title, "arms": arms, "rows": values})
+    return found
+
+
+def _typeset(name: str) -> str:
+    return name.replace("theta", "θ").replace("'", "′").replace("^2", "²")
+
+
+def _in_full(number: str) -> str:
+    """A large number without its exponent."""
+    return f"{float(number):,.0f}" if "e+" in number else number
 
 
 def _mark(result: Result) -> dict[str, float | str] | None:

@@ -55,8 +55,7 @@ def curves() -> Figure:
     figure.add_trace(force, 5, 1)
     figure.update_traces(hovertemplate="%{y:.4g} at %{x:.2f} s", selector={"hoverinfo": None})
     figure.update_xaxes(title_text="t (s)", row=5, col=1)
-    legend = {"x": 1.0, "xanchor": "right", "y": 1.015}
-    _quiet(figure, 900, meta=AXES, legend=legend, margin_t=60)  # room for Plotly's buttons
+    _quiet(figure, 900, meta=AXES, showlegend=False, margin_t=44)  # the page has its key; room for Plotly's buttons
     figure.update_yaxes(automargin=False)
     return figure.update_layout(margin_autoexpand=False)  # the page's cursor relies on the margins
 
@@ -103,8 +102,10 @@ def scatter(results: Sequence[Result]) -> Figure | None:
                         hovertemplate="%{text}<br>published %{x:.4g}<br>measured %{y:.4g}",
                     )
                 )
-    figure.update_xaxes(type="log", title_text="published MSE", dtick=1)
-    figure.update_yaxes(type="log", title_text="measured MSE", dtick=1)
+    span = [math.log10(end) for end in ends]  # an interval may reach down to 0, which is nowhere on this axis
+    axis: dict[str, Any] = {"type": "log", "range": span, "dtick": 1, "exponentformat": "power"}
+    figure.update_xaxes(title_text="published MSE", **axis)
+    figure.update_yaxes(title_text="measured MSE", **axis)
     return _quiet(figure, 520)
 
 

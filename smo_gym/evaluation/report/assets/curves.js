@@ -81,5 +81,19 @@ function curves(group, index, display) {
   figure.layout.meta[positions ? "positions" : "velocities"].forEach((title, row) => {
     figure.layout.annotations[row].text = title;
   });
+  key(figure.data.filter((trace) => trace.showlegend));
   return plot("curves", figure);
+}
+
+// What the lines are, outside of the plot: there it covers none.
+function key(traces) {
+  const entries = new Map(traces.map(({ name, line }) => [name, line]));
+  const item = ([name, line]) => {
+    const entry = document.createElement("li"), swatch = document.createElement("span");
+    swatch.className = "swatch";
+    swatch.style.borderTop = `2px ${{ dash: "dashed", dot: "dotted" }[line.dash] ?? "solid"} ${line.color}`;
+    entry.append(swatch, name);
+    return entry;
+  };
+  $("#curves-key").replaceChildren(...[...entries].map(item));
 }

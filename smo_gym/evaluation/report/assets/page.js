@@ -6,7 +6,8 @@ const stage = new Cart($("#stage"));
 const player = { time: 0, end: 0, playing: false };
 let chosen, index, run, ready = false;
 
-const number = (value, digits = 3) => (value === undefined ? "" : value.toFixed(digits).replace("-", "−"));
+const number = (value, digits = 3) =>
+  value === undefined ? "" : value.toFixed(digits).replace(/^-(?!0\.?0*$)/, "−").replace("-", "");
 const vector = (values) => `[${values.join(", ")}]`.replaceAll("-", "−");
 const names = {
   table: (group) => `${group.table}: ${group.title}`,
@@ -24,12 +25,14 @@ function options(select, pairs, wanted) {
   select.disabled = pairs.length < 2;
 }
 
-// Each select offers what the ones before it leave; the same choice is kept where it can be.
+// Each select offers what the ones before it leave; the same choice is kept where it can be. A law has another name in
+// another table: SMC goes on as SMC-TRACKING, not as the first that is there.
 function choose(wanted) {
   let left = data.groups;
   for (const key of KEYS) {
     const pairs = new Map(left.map((group) => [values[key](group), names[key](group)]));
-    options(form[key], [...pairs], wanted[key]);
+    const alike = key === "controller" && !pairs.has(wanted[key]) && left.find((group) => group.law === chosen?.law);
+    options(form[key], [...pairs], alike ? alike[key] : wanted[key]);
     left = left.filter((group) => values[key](group) === form[key].value);
   }
   [chosen] = left;
@@ -102,6 +105,13 @@ function play(on) {
   else seek(player.time);
 }
 
+function effect() {
+  const wanted = $("#effects-of")?.selectedIndex ?? 0;
+  document.querySelectorAll(".effect").forEach((one, index) => {
+    one.hidden = index !== wanted;
+  });
+}
+
 function compare() {
   if (figures.scatter) plot("scatter", tinted(figures.scatter));
   else $("#compared-scatter").hidden = true;
@@ -112,14 +122,21 @@ form.addEventListener("change", () => choose(Object.fromEntries([...KEYS, "run"]
 display.addEventListener("change", () => curves(chosen, index, display).then(cursor));
 button.addEventListener("click", () => play(!player.playing));
 slider.addEventListener("input", () => seek(Number(slider.value)));
-$("#stage").addEventListener("keydown", (event) => {
-  const step = { ArrowLeft: -0.05, ArrowRight: 0.05 }[event.key];
-  if (event.key === " ") play(!player.playing);
+document.addEventListener("keydown", (event) => {
+  const own = event.target.closest("a, button, select, input:not([type=range])"); // there the key has its own use
+  const step = event.target.id === "stage" ? { ArrowLeft: -0.05, ArrowRight: 0.05 }[event.key] : undefined;
+  if (event.key === " " && !own) play(!player.playing);
   else if (step) seek(player.time + step * (event.shiftKey ? 20 : 1));
   else return;
   event.preventDefault();
 });
 $("#filter").addEventListener("input", (event) => filter(event.currentTarget));
+$("#filter").addEventListener("reset", (event) => {
+  const form = event.currentTarget;
+  setTimeout(() => filter(form)); // once it is reset
+  form.elements[0].focus();
+});
+$("#effects-of")?.addEventListener("change", effect);
 for (const form of document.forms) form.addEventListener("submit", (event) => event.preventDefault());
 $("#bars-of").addEventListener("change", compare);
 for (const watch of document.querySelectorAll(".watch")) {
@@ -135,6 +152,7 @@ for (const watch of document.querySelectorAll(".watch")) {
 }
 
 filter($("#filter"));
+effect();
 try {
   await unpack();
   const last = data.groups.findLast((group) => group.table === data.groups[0].table && group.controller === data.groups[0].controller);

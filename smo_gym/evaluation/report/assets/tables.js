@@ -21,5 +21,9 @@ function filter(form) {
     }
     body.hidden = rows === 0;
   }
+  for (const box of document.querySelectorAll(".box:has(.cells)")) {
+    box.hidden = !$("tbody:not([hidden])", box);
+  }
+  $("#none").hidden = shown > 0;
   $("#count").value = `${shown} of ${all} rows`;
 }
