@@ -21,7 +21,7 @@ from smo_gym.envs.task import HANGING, Task
 
 ROOT = Path(__file__).resolve().parents[2]
 _MARK = re.compile(r"<!-- generated: (\w+) ?(.*?) -->")
-_WIDTH = "80"
+_WIDTH = "60"
 
 
 def on_page_markdown(markdown: str, **kwargs: Any) -> str:

@@ -23,7 +23,12 @@ def on_files(files: Files, config: MkDocsConfig, **kwargs: Any) -> Files:
 
 @functools.cache
 def _report() -> str:
-    with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
+    silent = io.StringIO()
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        contextlib.redirect_stdout(silent),
+        contextlib.redirect_stderr(silent),
+    ):
         page = Path(folder) / "report.html"
         main([*COMMAND.split(), "--out", f"{folder}/results", "--report", str(page)])
         return page.read_text(encoding="utf-8")

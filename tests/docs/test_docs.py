@@ -14,7 +14,10 @@ import pytest
 from conftest import ROOT
 
 DOCS = ROOT / "docs"
-EXECUTED = sorted(path.relative_to(DOCS).as_posix() for path in (DOCS / "tutorial.md", *DOCS.glob("how-to/*.md"), *DOCS.glob("for/*.md")))
+EXECUTED = sorted(
+    path.relative_to(DOCS).as_posix()
+    for path in (DOCS / "tutorial.md", *DOCS.glob("how-to/*.md"), *DOCS.glob("for/*.md"))
+)
 OFFLINE = {"NO_MKDOCS_2_WARNING": "1", "http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
 EXTERNAL = {"https://squidfunk.github.io/mkdocs-material/", "https://rl-baselines3-zoo.readthedocs.io"}
 SECTIONS = (
