@@ -1,4 +1,4 @@
-"""The animations of the environments' pages that ``agents/animate.py`` does not make: ``python docs/images/animations.py``."""
+"""The animations of two environments' pages: ``python docs/images/animations.py``."""
 
 from pathlib import Path
 

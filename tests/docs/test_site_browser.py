@@ -92,7 +92,10 @@ def test_every_page_fits_a_phone_and_says_no_error(tab, address, site):  # noqa:
 def test_drawings_follow_the_readers_choice_not_the_machines(tab, address):
     page = tab(color_scheme="dark")
     page.goto(f"{address}/index.html")
-    colours = "() => [getComputedStyle(document.querySelector('.picture .line')).stroke, getComputedStyle(document.body).backgroundColor]"
+    colours = """() => [
+        getComputedStyle(document.querySelector('.picture .line')).stroke,
+        getComputedStyle(document.body).backgroundColor,
+    ]"""
 
     def lightness(colour):
         return sum(map(int, colour[colour.index("(") + 1 : -1].split(",")[:3]))
