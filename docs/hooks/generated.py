@@ -21,7 +21,7 @@ from smo_gym.envs.task import HANGING, Task
 
 ROOT = Path(__file__).resolve().parents[2]
 _MARK = re.compile(r"<!-- generated: (\w+) ?(.*?) -->")
-_WIDTH = "100"
+_WIDTH = "60"
 
 
 def on_page_markdown(markdown: str, **kwargs: Any) -> str:
@@ -106,7 +106,13 @@ def environment(name: str) -> str:
     if cls is not base:
         parts += [_text(cls), _differences(env.unwrapped.task), "What follows holds for all three environments."]
     parts += [_text(base), f"## Version History\n\n- `{name}`: the first version, since smo_gym 0.1.0"]
-    return "\n\n".join(parts)
+    return "\n\n".join(parts).replace("## Rewards\n", f"## Rewards\n\n{_reward()}\n", 1)
+
+
+def _reward() -> str:
+    """The reward as the mathematics has it."""
+    section = (ROOT / "docs/mathematics.md").read_text(encoding="utf-8").partition("\n## Reward\n")[2]
+    return re.search(r"^\$\$ .* \$\$$", section, re.MULTILINE)[0]  # type: ignore[index]
 
 
 def _text(cls: type) -> str:

@@ -56,3 +56,10 @@ def test_an_open_block_is_noticed():
         blocks("```sh\nls\n")
     with pytest.raises(AssertionError, match="inside of a block"):
         blocks("```sh\nls\n```python\n1\n```\n")
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_every_picture_is_there_small_and_described(page):
+    for alt, target in re.findall(r"!\[(.*?)\]\((.+?)\)", page.read_text(encoding="utf-8")):
+        assert len(alt) > 30, target
+        assert (page.parent / target).stat().st_size < 400_000
