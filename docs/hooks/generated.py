@@ -43,7 +43,7 @@ def output(name: str, *arguments: str) -> str:
             main([name, *arguments])
     finally:
         os.environ.pop("COLUMNS") if before is None else os.environ.update(COLUMNS=before)
-    return f"```text\n{shown.getvalue()}```"
+    return f"```{{.text .terminal}}\n{shown.getvalue()}```"
 
 
 def modules(package: str) -> str:
