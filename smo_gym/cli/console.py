@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import io
 import os
+import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from typing import Any, TextIO, cast
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+from ..evaluation.formats import WIDTH
+
+if TYPE_CHECKING:
+    from rich.console import Console as Screen
+
+NARROW = 80
+"""Columns that there are at least: a narrower terminal wraps lines itself."""
 
 
 class Console:
@@ -61,3 +70,14 @@ def guarded() -> Iterator[tuple[Console, Console]]:
         for console in consoles:
             console.flush()
         sys.stdout, sys.stderr = streams
+
+
+def screen() -> Screen:
+    """Standard output for rich text: of the terminal's width within bounds, plain where it is none.
+
+    Colours follow the terminal, NO_COLOR and FORCE_COLOR.
+    """
+    from rich.console import Console as Screen
+
+    width = min(max(shutil.get_terminal_size((WIDTH, 0)).columns, NARROW), WIDTH)
+    return Screen(file=sys.stdout, width=width, highlight=False, markup=False, emoji=False, force_jupyter=False)

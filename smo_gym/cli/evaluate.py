@@ -2,8 +2,9 @@
 
     smo-gym evaluate --controller all --scenario all
 
-Prints the tables and writes results.csv, runs.csv, tables.md, tables.tex and the resolved settings to --out, with
---figures the article's Figures 3-17 as PDF and PNG to --out/figures, and with --report a page to look at it all.
+Prints what the tables come to and writes them to --out: results.csv, runs.csv, tables.md, tables.tex and the resolved
+settings, with --figures the article's Figures 3-17 as PDF and PNG to --out/figures, and with --report a page to look at
+it all.
 """
 
 from __future__ import annotations
@@ -21,19 +22,22 @@ from tqdm import tqdm
 
 from .. import files
 from ..article import WITH, WITHOUT
-from ..evaluation import configs, scenario, study
+from ..evaluation import configs, formats, scenario, study
 from ..evaluation.arms import ARMS, EVERY, PRINTED, SMO
-from ..evaluation.report import figures, page, tables
+from ..evaluation.report import answer, figures, page, tables
 from ..evaluation.statistics import Result, results
 from ..policies import named
 from ..validation import choice, unknown
 from . import computing
+from .answer import show
 from .arguments import Parser, fraction, one_of, positive, several, versions
 from .entry import Stop, command, said, typed
 from .progress import simulated
 
 SCENARIOS = ("regulation", "initial-conditions", "tracking")
 RESULTS = ("results.csv", "runs.csv", "tables.md", "tables.tex", "reference.json", "settings.yaml")
+UNSAID = (*computing.OPTIONS, "verbose")
+"""Options that change nothing in the results, and are not in their settings."""
 COMPENSATION = {"on": (WITH,), "off": (WITHOUT,), "both": PRINTED}
 
 
@@ -92,6 +96,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
+    add("--verbose", action="store_true", help="print every cell of every table too, as in tables.md")
     parser.out("results", "folder for the results")
     computing.add(parser)
     return parser.parse_args(arguments)
@@ -182,12 +187,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except ValueError as error:  # an agent's force that is not finite, or its error
             raise ValueError(f"{error}; nothing was written") from None
         numbers = results(outcomes)
+        found = answer.blocks(outcomes, numbers)
+        sentences = answer.words(found)
+        written = False
         try:
-            files.write_set(out, contents(args, scenarios, outcomes, numbers), replaced())
+            files.write_set(out, contents(args, scenarios, outcomes, numbers, sentences), replaced())
+            written = True
         finally:  # what cannot be written can be read at least
-            print(tables.render(numbers, "simple", rms=False))
-            print(tables.diagnostics(outcomes, "simple"))
-            print(f"\n{tables.summary(numbers)}", flush=True)
+            if args.verbose or not written:
+                print(tables.render(numbers, "simple", rms=False))
+                print(tables.diagnostics(outcomes, "simple"))
+                print(f"\n{formats.paragraph(tables.summary(numbers), 'simple')}\n", flush=True)
+            show(found, sentences)
         try:
             draw(out, drawn, outcomes, numbers)
             if args.report:
@@ -198,9 +209,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except OSError as error:
             raise Stop(f"error: {said(error)}; the tables are in {out}", 1) from None
     if left_out:
-        print(f"\nno runs for Figure {', '.join(str(plan.number) for plan in left_out)}: not drawn")
-    where = f"{out} and {args.report}" if args.report else out
-    print(f"\n{runs} runs in {time.perf_counter() - began:.1f} s; results are in {where}")
+        print(f"no runs for Figure {', '.join(str(plan.number) for plan in left_out)}: not drawn")
+    also = f"; all of it to look at: {args.report}" if args.report else ""
+    print(f"{runs} runs in {time.perf_counter() - began:.1f} s; results are in {out}: tables.md has every cell{also}")
     return 0
 
 
@@ -209,20 +220,23 @@ def contents(
     scenarios: Sequence[scenario.Scenario],
     outcomes: Sequence[study.Outcome],
     numbers: Sequence[Result],
+    sentences: Sequence[str],
 ) -> dict[str, str]:
     """The files of results by name, the settings they come from last."""
-    told = {key: value for key, value in vars(args).items() if key not in computing.OPTIONS}
+    told = {key: value for key, value in vars(args).items() if key not in UNSAID}
     resolved = {
         "command": {key: str(value) if isinstance(value, Path) else value for key, value in told.items()},
         "versions": versions(),
         "scenarios": [place.model_dump(mode="json") for place in scenarios],
     }
     notes = tables.diagnostics(outcomes, "github")
+    said_of_all = "\n\n".join(formats.markdown(text) for text in (tables.summary(numbers), *sentences))
     followed = [reference for place in scenarios if (reference := place.trajectory()) is not None]
     return {
         "results.csv": tables.results_csv(numbers),
         "runs.csv": tables.runs_csv(outcomes),
-        "tables.md": tables.render(numbers, "github", rms=True) + f"\n## Diagnostics\n\n{notes}\n",
+        "tables.md": tables.render(numbers, "github", rms=True)
+        + f"\n## Diagnostics\n\n{notes}\n\n## In words\n\n{said_of_all}\n",
         "tables.tex": tables.render(numbers, "latex_booktabs", rms=True),
         **({"reference.json": followed[-1].to_json() + "\n"} if followed else {}),
         "settings.yaml": yaml.safe_dump(resolved, sort_keys=False),

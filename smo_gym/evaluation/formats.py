@@ -5,11 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from tabulate import LATEX_ESCAPE_RULES, tabulate
 
+WIDTH = 100
+"""Columns that a console's text fits in."""
 _NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _WHOLE = re.compile(r"[-+]?[0-9]+")
 
@@ -38,6 +41,12 @@ def mathtext(text: str) -> str:
 def escaped(text: str, form: str) -> str:
     """A text in a format of tabulate: as LaTeX, as Markdown or, on a console, as one line."""
     return latex(text) if form.startswith("latex") else markdown(text) if form == "github" else line(text)
+
+
+def paragraph(text: str, form: str) -> str:
+    """A text as a paragraph in a format of tabulate: on a console, in lines of at most 100 columns."""
+    shown = escaped(text, form)
+    return textwrap.fill(shown, WIDTH, break_long_words=False, break_on_hyphens=False) if form == "simple" else shown
 
 
 def heading(text: str, form: str, level: int = 2) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,10 +32,25 @@ def ceiling(values: Array) -> float:
     return float(np.mean(np.abs(values.mean() / drawn - 1.0) <= 0.1))
 
 
-def costs(outcomes: Sequence[Outcome]) -> list[str]:
-    """What the compensation costs, a line for each table and controller that ran with and without it.
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """Means without and with compensation over pairs of runs on the same plant that failed in neither arm."""
 
-    Over pairs of runs on the same plant that failed in neither arm, the nominal plant's left out.
+    effort: tuple[float, float]
+    """In N^2 s."""
+    peak_force: tuple[float, float]
+    """In N."""
+    speed_error: tuple[float, float]
+    """RMS error of the estimate of h', in m/s."""
+    worse: int
+    """In how many pairs the speed's error is larger with compensation."""
+    pairs: int
+
+
+def costs(outcomes: Sequence[Outcome]) -> dict[tuple[str, str], Cost]:
+    """What the compensation costs, by table and controller that ran with and without it; the nominal plant's left out.
+
+    NaN where no pair of runs stands.
     """
     pairs: dict[tuple[str, str], list[tuple[Outcome, Outcome]]] = {}
     arms = {(o.group.scenario.table, o.group.name, o.group.uncertainty, o.group.case, o.group.arm): o for o in outcomes}
@@ -41,10 +58,15 @@ def costs(outcomes: Sequence[Outcome]) -> list[str]:
         other = arms.get((*place, WITH))  # type: ignore[arg-type]
         if arm == WITHOUT and other is not None and outcome.group.uncertainty > 0.0:
             pairs.setdefault((str(place[0]), str(place[1])), []).append((outcome, other))
-    return [f"Table {table}, {name}: {_cost(both)}" for (table, name), both in pairs.items()]
+    return {where: _cost(both) for where, both in pairs.items()}
 
 
-def _cost(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
+def cost_lines(outcomes: Sequence[Outcome]) -> list[str]:
+    """The same in words, a line for each table and controller."""
+    return [f"Table {table}, {name}: {_said(cost)}" for (table, name), cost in costs(outcomes).items()]
+
+
+def _cost(pairs: Sequence[tuple[Outcome, Outcome]]) -> Cost:
     both = [~(a.failed | b.failed) for a, b in pairs]
 
     def column(name: str) -> tuple[Array, Array]:
@@ -53,14 +75,28 @@ def _cost(pairs: Sequence[tuple[Outcome, Outcome]]) -> str:
         )
         return without, compensated
 
-    effort, force, speed = column("effort"), column("peak_force"), column("estimation_rms_h_dot")
-    if not effort[0].size:
+    def means(name: str) -> tuple[float, float]:
+        without, compensated = column(name)
+        return (float(without.mean()), float(compensated.mean())) if without.size else (math.nan, math.nan)
+
+    speed = column("estimation_rms_h_dot")
+    return Cost(
+        effort=means("effort"),
+        peak_force=means("peak_force"),
+        speed_error=means("estimation_rms_h_dot"),
+        worse=int(np.count_nonzero(speed[1] > speed[0])),
+        pairs=speed[0].size,
+    )
+
+
+def _said(cost: Cost) -> str:
+    if not cost.pairs:
         return "no pair of runs stands."
-    means = {
-        name: [float(arm.mean()) for arm in values] for name, values in (("u", effort), ("F", force), ("v", speed))
-    }
+    effort, force, speed = (
+        f"{without:.3g} and {compensated:.3g}"
+        for without, compensated in (cost.effort, cost.peak_force, cost.speed_error)
+    )
     return (
-        f"without and with compensation, effort {means['u'][0]:.3g} and {means['u'][1]:.3g} N^2 s, mean peak force "
-        f"{means['F'][0]:.3g} and {means['F'][1]:.3g} N, RMS error of the estimate of h' {means['v'][0]:.3g} and "
-        f"{means['v'][1]:.3g} m/s, worse with it in {np.count_nonzero(speed[1] > speed[0])} of {speed[0].size} runs."
+        f"without and with compensation, effort {effort} N^2 s, mean peak force {force} N, RMS error of the estimate "
+        f"of h' {speed} m/s, worse with it in {cost.worse} of {cost.pairs} runs."
     )

@@ -41,7 +41,7 @@ def published_cells(rows, controller, table):
 def both_tables(tmp_path_factory):
     """All tables for both controllers with the default 10 runs."""
     out = tmp_path_factory.mktemp("both")
-    options = ["--controller", "all", "--scenario", "all", "--out", str(out)]
+    options = ["--controller", "all", "--scenario", "all", "--verbose", "--out", str(out)]
     done = subprocess.run([sys.executable, str(EVALUATE), *options], check=True, capture_output=True, text=True)
     return done.stdout, read(out / "results.csv"), out
 
@@ -134,7 +134,7 @@ def small_scenario(tmp_path, **changes):
 
 def test_options_choose_arms_levels_and_files(evaluate, tmp_path):
     config = small_scenario(tmp_path, horizon={"value": 0.5, "source": "chosen"})
-    options = ("--uncertainty", "20%", "0.1", "--runs", "3", "--controller", "lqr")
+    options = ("--uncertainty", "20%", "0.1", "--runs", "3", "--controller", "lqr", "--verbose")
     done = evaluate("--config", config, *options, "--observer", "oracle", "--out", tmp_path / "new" / "deep")
     rows = read(tmp_path / "new" / "deep" / "results.csv")
     assert {row["compensation"] for row in rows} == {"oracle"}
@@ -167,8 +167,10 @@ def test_failed_runs_are_shown(evaluate, tmp_path):
     case_2 = [row for row in rows if row["case"] == "2" and row["metric"] == "mse"]
     assert all(row["failures"] == row["runs"] and row["measured"] == "" for row in case_1)
     assert all(row["failures"] == "0" and row["measured"] for row in case_2)
-    assert "3 of 3" in done.stdout
-    assert "16 of 32 runs failed" in done.stdout
+    assert "3 of 3" in (tmp_path / "out" / "tables.md").read_text()
+    assert "16 of 32 runs failed and are in no average: Table 5, LQR: without 8 of 16, with 8 of 16." in " ".join(
+        done.stdout.split()
+    )
 
 
 def test_the_theorems_gains_are_an_arm_of_their_own(evaluate, tmp_path):
@@ -186,7 +188,9 @@ def test_the_theorems_gains_are_an_arm_of_their_own(evaluate, tmp_path):
     tight = yaml.safe_load(configs.path("article").read_text())["designed"]
     tight["operating_set"]["speed"]["value"] = [0.1, 0.1]
     config = small_scenario(tmp_path, horizon={"value": 0.5, "source": "chosen"}, designed=tight)
-    done = evaluate("--config", config, "--controller", "lqr", "--runs", "2", "--observer", "theorem", cwd=tmp_path)
+    done = evaluate(
+        "--config", config, "--controller", "lqr", "--runs", "2", "--observer", "theorem", "--verbose", cwd=tmp_path
+    )
     assert "8 of 8" in done.stdout
     without = small_scenario(tmp_path, designed=None)
     done = evaluate("--config", without, "--observer", "theorem", check=False, cwd=tmp_path)

@@ -85,7 +85,7 @@ def test_a_registered_arm_is_in_tables_files_and_report(own, small, tmp_path, ca
     pytest.importorskip("plotly")
     out, report = tmp_path / "out", tmp_path / "report.html"
     config = ("--config", tmp_path / "small.yaml", "--controller", "lqr", "--runs", 2)
-    assert evaluate(*config, "--observer", "all", "--out", out, "--report", report) == 0
+    assert evaluate(*config, "--observer", "all", "--verbose", "--out", out, "--report", report) == 0
     shown = capsys.readouterr().out
     for name in own:
         assert re.search(rf" {name} ", shown.split("est. h, m")[0])  # a cell

@@ -30,7 +30,7 @@ def test_the_ceiling_is_the_share_of_ten_run_means_near_the_true_one():
 
 
 def test_compensation_costs_ten_times_the_effort_and_makes_the_estimate_of_the_speed_worse(regulation):
-    (line,) = verdicts.costs(regulation)
+    (line,) = verdicts.cost_lines(regulation)
     assert line.startswith(
         "Table 4, lqr: without and with compensation, effort 41 and 420 N^2 s, mean peak force 6.18 and"
     )

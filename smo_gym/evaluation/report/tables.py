@@ -16,7 +16,7 @@ from ..formats import as_csv
 from ..statistics import Result
 from ..study import Outcome
 
-HEADER = ("", "state", "compensation", "published", "measured", "95 % interval", "median", "ratio", "failed")
+HEADER = ("", "state", "arm", "published", "measured", "95 % interval", "median", "ratio", "failed")
 REDUCTION_HEADER = ("", "state", "published %", "measured %", "95 % interval", "median")
 REDUCTION = "mse_reduction_percent"
 
@@ -46,7 +46,7 @@ def render(results: Sequence[Result], form: str, *, rms: bool) -> str:
         if reductions:
             parts.append(formats.heading("Reduction of the MSE by the compensation", form, level=3))
             parts.append(_table(form, REDUCTION_HEADER, [reduction_row(row) for row in reductions]))
-        parts.append(formats.escaped(verdict(rows), form))
+        parts.append(formats.paragraph(verdict(rows), form))
     return "\n\n".join(parts) + "\n"
 
 
@@ -65,8 +65,8 @@ def verdict(rows: Sequence[Result]) -> str:
         f"{off.size} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(off**2)):.1f} %, "
         f"{np.count_nonzero(np.abs(np.expm1(off)) <= 0.1)} within 10 %"
         + (f" (means of ten runs would come to {most:.1f} with every setting exact), " if math.isfinite(most) else ", ")
-        + f"furthest off {100 * np.expm1(furthest):+.1f} %. "
-        + (f"Averages off {', '.join(f'{100 * np.expm1(a):+.1f} %' for a in averages)}. " if averages else "")
+        + f"furthest off {100 * np.expm1(furthest):+z.1f} %. "
+        + (f"Averages off {', '.join(f'{100 * np.expm1(a):+z.1f} %' for a in averages)}. " if averages else "")
         + failed
     )
 
@@ -76,12 +76,17 @@ def title(controller: str) -> str:
     return controller.upper() if re.fullmatch(r"[\w -]*", controller) else formats.line(controller)
 
 
+def within(result: Result) -> bool:
+    """Whether a measured number is within 10 % of the published one."""
+    return bool(abs(math.expm1(result.deviation)) <= 0.1)
+
+
 def summary(results: Sequence[Result]) -> str:
     """How many published MSE cells are met."""
     cells = [r for r in results if r.cell.metric == "mse" and not r.cell.is_average and math.isfinite(r.deviation)]
     if not cells:
         return "Nothing is published for these runs to compare with."
-    near = sum(abs(math.expm1(r.deviation)) <= 0.1 for r in cells)
+    near = sum(map(within, cells))
     inside = sum(r.ci_low <= r.published <= r.ci_high for r in cells)
     foreseen = sum(abs(r.published - r.measured) <= r.half_width for r in cells)
     return (
@@ -91,9 +96,23 @@ def summary(results: Sequence[Result]) -> str:
 
 
 def diagnostics(outcomes: Sequence[Outcome], form: str) -> str:
-    """What the runs showed beside their MSE: a table, its registered metrics, and what the compensation costs."""
-    lines = (*(f"{metric.name}: {metric.label}" for metric in metrics.registered()), *verdicts.costs(outcomes))
-    return "\n\n".join([_table(form, *diagnosed(outcomes)), *(formats.escaped(line, form) for line in lines)])
+    """What the runs showed beside their MSE: tables, registered metrics, and what the compensation costs."""
+    header, rows = diagnosed(outcomes)
+    parts = []
+    for name, columns in _PARTS.items():
+        if any(any(row[columns]) for row in rows):
+            parts.append(formats.heading(f"Diagnostics: {name}", form, level=3))
+            parts.append(_table(form, *_columns(columns, header, rows)))
+    lines = (*(f"{metric.name}: {metric.label}" for metric in metrics.registered()), *verdicts.cost_lines(outcomes))
+    return "\n\n".join([*parts, *(formats.paragraph(line, form) for line in lines)])
+
+
+def _columns(
+    columns: slice, header: tuple[str, ...], rows: Sequence[tuple[str, ...]]
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Some columns behind those that say where a row stands."""
+    cut = [(*line[:_PLACE], *line[columns]) for line in (header, *rows)]
+    return cut[0], cut[1:]
 
 
 def diagnosed(outcomes: Sequence[Outcome]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
@@ -134,6 +153,14 @@ _DIAGNOSTICS = {
     "peak_theta": "peak theta, rad",
     "peak_force": "peak F, N",
 }
+_PLACE = 3
+"""Table, controller, arm: the first columns of the diagnostics."""
+_PARTS = {
+    "RMS errors of the estimate": slice(_PLACE, 7),
+    "effort and peaks": slice(7, 12),
+    "registered metrics, and runs that left the operating set of the theorem's gains": slice(12, None),
+}
+"""Tables that the diagnostics are shown in, each narrow enough for a console."""
 
 
 def results_csv(results: Sequence[Result]) -> str:
@@ -206,7 +233,7 @@ def reduction_row(row: Result) -> tuple[str, ...]:
     """A reduction under :data:`REDUCTION_HEADER`."""
 
     def percent(value: float) -> str:
-        return f"{value:.1f}" if math.isfinite(value) else ""
+        return f"{value:z.1f}" if math.isfinite(value) else ""
 
     numbers = (percent(row.published), percent(row.measured), _span(row, percent), percent(row.median))
     return (label(row.cell), row.cell.state, *numbers)
