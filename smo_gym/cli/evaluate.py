@@ -200,7 +200,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"\n{formats.paragraph(tables.summary(numbers), 'simple')}\n", flush=True)
             show(found, sentences)
         try:
-            draw(out, drawn, outcomes, numbers)
+            starts = measure(figures.starts(drawn, groups), args.seed, samples=figures.DENSE)
+            draw(out, drawn, outcomes, starts, numbers)
             if args.report:
                 line = typed("evaluate", arguments)
                 files.write(args.report, page.render(outcomes, numbers, line, versions()))
@@ -244,12 +245,16 @@ def contents(
 
 
 def draw(
-    out: Path, drawn: Sequence[figures.Plan], outcomes: Sequence[study.Outcome], numbers: Sequence[Result]
+    out: Path,
+    drawn: Sequence[figures.Plan],
+    outcomes: Sequence[study.Outcome],
+    starts: Sequence[study.Outcome],
+    numbers: Sequence[Result],
 ) -> None:
     """The figures, as a set of files."""
     made: dict[str, str | bytes] = {}
     for plan in tqdm(drawn, unit="figure", leave=False, disable=None):
-        figure = figures.draw(plan, outcomes, numbers)
+        figure = figures.draw(plan, outcomes, starts, numbers)
         made |= {drawing(plan, form): figures.encode(figure, form) for form in figures.FORMATS}
     if made:
         files.write_set(out, made)

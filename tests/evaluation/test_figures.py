@@ -1,9 +1,12 @@
 """The article's figures: what they show is what was measured and published."""
 
+import re
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from conftest import ROOT
 from matplotlib.colors import to_rgb, to_rgba
 
 from smo_gym.cli.evaluate import main as evaluate
@@ -22,7 +25,8 @@ def study_of_all():
     """All of the article's runs, coarser and shorter, and more of each than are traced."""
     scenarios = [load(name, **({} if name == "tracking" else {"horizon": 5.0})) for name in NAMES]
     outcomes = study.measure(study.groups(scenarios, ["lqr", "smc"], ["without", "with"], 12), seed=0, samples=100)
-    return outcomes, statistics.results(outcomes)
+    starts = study.measure(figures.starts(figures.PLANS, (o.group for o in outcomes)), seed=0, samples=figures.DENSE)
+    return outcomes, starts, statistics.results(outcomes)
 
 
 @pytest.fixture
@@ -34,8 +38,8 @@ def drawn(study_of_all):
     return draw
 
 
-def shown(study_of_all, controller, table, arm, level=0.2, case=""):
-    groups = ((o, o.group) for o in study_of_all[0])
+def shown(study_of_all, controller, table, arm, level=0.2, case="", start=False):
+    groups = ((o, o.group) for o in study_of_all[start])
     wanted = (table, controller, arm, level, case)
     (outcome,) = (o for o, g in groups if (g.scenario.table, g.name, g.arm, g.uncertainty, g.case) == wanted)
     return outcome
@@ -47,7 +51,7 @@ def lines(panel, colour):
 
 
 def test_traces_are_of_the_first_ten_runs_and_change_no_number(study_of_all):
-    outcomes, _ = study_of_all
+    outcomes, *_ = study_of_all
     again = study.measure([outcome.group for outcome in outcomes], seed=0)
     for plain, traced in zip(again, outcomes, strict=True):
         assert plain.traces is None
@@ -69,7 +73,7 @@ def test_traces_of_no_instants_or_none_at_all_are_refused(study_of_all):
         study.measure(groups, seed=0, samples=0)
     nothing = [study.Outcome(o.group, o.metrics, o.failed) for o in study_of_all[0]]
     with pytest.raises(ValueError, match="lqr has no traces to draw"):
-        figures.draw(figures.PLANS[0], nothing, [])
+        figures.draw(figures.PLANS[0], nothing, [], [])
 
 
 def test_every_figure_of_the_article_is_planned_once():
@@ -120,27 +124,78 @@ def test_tracking_has_an_arm_a_column_and_the_reference_in_black(drawn, study_of
 )
 def test_errors_are_true_less_estimated(drawn, study_of_all, number, controller, table):
     _, figure = drawn(number)
-    traces = shown(study_of_all, controller, table, "without").traces
     for i, panel in enumerate(figure.axes):
         j, enlarged = i // 2, i % 2
+        traces = shown(study_of_all, controller, table, "without", start=bool(enlarged)).traces
         line = lines(panel, panels.COLOURS[controller]["without"])[7]
         expected = (traces.x - traces.xhat)[:, j, 7]
-        assert (line.get_ydata() == expected[traces.time <= 3.0] if enlarged else expected).all()
+        np.testing.assert_array_equal(line.get_ydata(), expected[traces.time <= panels.START] if enlarged else expected)
+        if enlarged:
+            np.testing.assert_allclose(line.get_xdata(), 0.01 * np.arange(201))  # every control instant
         assert line.get_ydata()[0] == traces.x[0, j, 7]  # xhat(0) = 0
     assert figure.axes[0].get_ylabel() == r"$h - \hat{h}$ (m)"
+
+
+def test_a_start_is_the_beginning_of_the_same_runs(study_of_all):
+    outcomes, starts, _ = study_of_all
+    assert {start.group.name for start in starts} == {"lqr", "smc", "smc-tracking"}
+    for start in starts:
+        group = start.group
+        whole = shown(study_of_all, group.name, group.scenario.table, group.arm).traces
+        instants = np.searchsorted(start.traces.time, whole.time[whole.time <= panels.START] - 1e-9)
+        for name in ("x", "xhat", "u"):
+            np.testing.assert_array_equal(getattr(start.traces, name)[instants], getattr(whole, name)[: len(instants)])
+
+
+def test_titles_name_the_quantity_and_no_two_are_alike(drawn):
+    words = {"states": "States", "errors": "Estimation errors", "inputs": "Force", "mse": "MSE"}
+    titles = []
+    for plan in figures.PLANS:
+        _, figure = drawn(plan.number)
+        number, title = figure.get_suptitle().splitlines()[0].split(". ")
+        assert number == f"Figure {plan.number}"
+        assert title.startswith(words[plan.kind])
+        titles.append(title)
+    assert len({*titles}) == 15
+
+
+def test_cases_are_explained_where_bars_stand_for_them(drawn):
+    title = " ".join(drawn(13)[1].get_suptitle().split())
+    assert "1: [1, 1, 0.1, 0.01]; 2: [0.15, −1, 0.1, 0.01]; 3: [−1, −1, 0.1, 0.01]; 4: [−0.2, 1, 0.1, 0.01]" in title
+
+
+@pytest.mark.parametrize("number", [8, 17])
+def test_switching_is_fifty_milliseconds_at_every_control_instant(number):
+    scenarios = [scenario.named(name) for name in ("regulation", "tracking")]
+    groups = [g for g in study.groups(scenarios, ["smc"], ["without", "with"], 1) if g.uncertainty in (0.0, 0.2)]
+    groups = [g for g in groups if g.scenario.table == ("4" if number == 8 else "7")]
+    (plan,) = (plan for plan in figures.PLANS if plan.number == number)
+    starts = study.measure(figures.starts([plan], groups), seed=0, samples=figures.DENSE)
+    figure = figures.draw(plan, starts, starts, [])
+    assert len(starts) == 2
+    for panel, start in zip(figure.axes[1::2], starts, strict=True):
+        (line,) = (line for line in panel.lines if len(line.get_xdata()) > 2)
+        time, force = line.get_data()
+        np.testing.assert_allclose(time, np.arange(1950, 2001) / 1000, atol=1e-9)
+        assert (force == start.traces.u[1950:2001, 0]).all()
+        assert line.get_drawstyle() == "steps-pre"  # over the period that ended at the instant
+        assert sum(a * b < 0.0 for a, b in pairwise(force)) >= 3
 
 
 @pytest.mark.parametrize(("number", "controllers"), [(8, ("lqr", "smc")), (17, ("smc-tracking",))])
 def test_inputs_show_the_range_of_all_runs(drawn, study_of_all, number, controllers):
     _, figure = drawn(number)
+    columns = len(controllers) + 1  # the last one is of the switching
     for i, panel in enumerate(figure.axes):
-        controller, arm = controllers[i % len(controllers)], ("without", "with")[i // len(controllers)]
+        if i % columns == len(controllers):
+            continue
+        controller, arm = controllers[i % columns], ("without", "with")[i // columns]
         traces = shown(study_of_all, controller, "4" if number == 8 else "7", arm).traces
         (paths,) = (collection.get_paths() for collection in panel.collections if collection.get_paths())
         band = paths[0].vertices[:, 1]
         assert (band.min(), band.max()) == (traces.u_low.min(), traces.u_high.max())
         assert len(lines(panel, panels.COLOURS[controller][arm])) == 10
-        assert arm in panel.get_ylabel() or i % len(controllers)
+        assert arm in panel.get_ylabel() or i % columns
 
 
 @pytest.mark.parametrize(("number", "rows"), [(5, 7), (13, 4), (15, 7)])
@@ -157,7 +212,7 @@ def test_bars_are_the_measured_and_published_numbers(drawn, study_of_all, number
             assert to_rgba(panels.COLOURS[controller][arm]) == bar.patches[0].get_edgecolor()
             cells = {
                 getattr(r, label)
-                for r in study_of_all[1]
+                for r in study_of_all[2]
                 if (r.cell.table, r.cell.controller, r.cell.state, r.cell.compensation, r.cell.metric)
                 == (plan.table, controller, state, arm, "mse")
             }
@@ -188,21 +243,22 @@ def test_one_arm_of_one_plant_is_drawn_too():
     tracking = load("tracking", uncertainty=(0.0,))
     outcomes = study.measure(study.groups([tracking], ["smc"], ["with"], 1), seed=0, samples=100)
     results = statistics.results(outcomes)
+    starts = study.measure([outcome.group for outcome in outcomes], seed=0, samples=figures.DENSE)
     drawn, left_out = figures.planned([outcome.group for outcome in outcomes])
     assert [plan.number for plan in drawn] == [14, 15, 16, 17]
     assert len(drawn) + len(left_out) == 15
-    states, bars, _, inputs = (figures.draw(plan, outcomes, results) for plan in drawn)
+    states, bars, _, inputs = (figures.draw(plan, outcomes, starts, results) for plan in drawn)
     assert "1 plant at 0 %" in states.get_suptitle()
     assert [panel.get_legend().get_title().get_text() for panel in states.axes[:1]] == ["with compensation"]
     assert bars.axes[0].containers[-1].get_label() == "with, measured"
-    assert len(inputs.axes) == 1
+    assert len(inputs.axes) == 2
 
 
 def test_failed_runs_end_where_they_failed():
     table5 = load("initial-conditions", horizon=3.0, track_limit=1.03)
     outcomes = study.measure(study.groups([table5], ["lqr"], ["without", "with"], 3), seed=0, samples=100)
     (plan,) = (plan for plan in figures.PLANS if plan.number == 9)
-    figure = figures.draw(plan, outcomes, [])
+    figure = figures.draw(plan, outcomes, [], [])
     failed = [o for o in outcomes if plan.shows(o.group) and o.group.uncertainty and o.failed.any()]
     assert "3 of 6 runs failed and end there" in figure.get_suptitle()
     line = lines(figure.axes[0], panels.COLOURS["lqr"][failed[0].group.arm])[0]
@@ -229,3 +285,13 @@ def test_what_cannot_be_drawn_is_said_before_any_run(tmp_path, capsys, monkeypat
     assert evaluate(options) == 2
     assert 'pip install "smo_gym[plots]"' in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_gallery_shows_every_figure_and_says_what_it_shows():
+    page = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    pictures = dict(re.findall(r"!\[([^\]]{40,})\]\(images/figures/([\w-]+)\.png\)", page))
+    assert [*pictures.values()] == [plan.name for plan in figures.PLANS]  # each with a text of its own
+    paths = [ROOT / "docs" / "images" / "figures" / f"{plan.name}.png" for plan in figures.PLANS]
+    assert max(path.stat().st_size for path in paths) <= 65_000
+    assert sum(path.stat().st_size for path in paths) < 1_000_000
+    assert {*paths} == {*paths[0].parent.iterdir()}

@@ -34,8 +34,10 @@ Columns = Mapping[str, Sequence[Outcome]]
 WINDOW = 0.25
 """Length in s of the window that chattering is averaged over."""
 _POSITIONS = (("h", "m"), ("\\theta", "rad"))
-_WIDTH = 6.9  # in, a page's text
-_START = 3.0  # s, of the estimation errors
+START = 2.0
+"""Length in s of the start that is shown at every control instant."""
+_SWITCHING = 0.05  # s, at the end of the start: some switchings of a force that chatters
+_WIDTH = 5.5  # in: the text of a page; letters of 9 pt can still be read in a column, and from the back of a room
 _BAR_KINDS = ("published", "measured")
 
 
@@ -48,7 +50,7 @@ def columns_by(key: Literal["name", "arm"], outcomes: Sequence[Outcome]) -> dict
 
 def states(columns: Columns) -> Figure:
     """Positions h above theta, with the reference where there is one."""
-    figure, axes = _panels(2, len(columns), 3.6, sharex=True, sharey="row")
+    figure, axes = _panels(2, len(columns), 4.0, sharex=True, sharey="row")
     for column, (title, chosen) in zip(axes.T, columns.items(), strict=True):
         for j, panel in enumerate(column):
             for outcome in chosen:
@@ -61,39 +63,59 @@ def states(columns: Columns) -> Figure:
     return _finished(figure, axes, list(columns))
 
 
-def errors(outcomes: Sequence[Outcome]) -> Figure:
+def errors(outcomes: Sequence[Outcome], starts: Sequence[Outcome]) -> Figure:
     """Errors h - hhat above theta - thetahat, over the entire simulation and, beside it, at its start."""
-    horizon = outcomes[0].group.scenario.horizon.value
-    columns = {"entire simulation": horizon, "its start": min(_START, horizon)}
-    figure, axes = _panels(2, 2, 3.6, width_ratios=(3, 2), sharex="col", sharey="row")
-    for column, until in zip(axes.T, columns.values(), strict=True):
+    columns = {"entire simulation": outcomes, f"first {START:g} s, every step": starts}
+    figure, axes = _panels(2, 2, 4.0, sharex="col", sharey="row")
+    for column, chosen in zip(axes.T, columns.values(), strict=True):
         for j, panel in enumerate(column):
-            for outcome in outcomes:
+            for outcome in chosen:
                 traces = traced(outcome)
-                _lines(panel, outcome, traces.x[:, j] - traces.xhat[:, j], until, label=until == horizon)
+                until = START if chosen is starts else math.inf
+                _lines(panel, outcome, traces.x[:, j] - traces.xhat[:, j], until, label=chosen is outcomes)
     for panel, (state, unit) in zip(axes[:, 0], _POSITIONS, strict=True):
         panel.set_ylabel(f"${state} - \\hat{{{state}}}$ ({unit})")
     return _finished(figure, axes, list(columns))
 
 
-def inputs(columns: Columns) -> Figure:
-    """The force without above with compensation: each run's mean, and the range of all."""
+def inputs(columns: Columns, starts: Sequence[Outcome]) -> Figure:
+    """The force without above with compensation: each run's mean and the range of all; of SMC's, its switching too."""
     arms = [arm for arm in PRINTED if any(o.group.arm == arm for chosen in columns.values() for o in chosen)]
-    figure, axes = _panels(len(arms), len(columns), 1.8 * len(arms), sharex=True, sharey="col")
-    for column, chosen in zip(axes.T, columns.values(), strict=True):
+    switching = [o for o in starts if o.group.settings.law == "smc"]
+    titles = [*columns, *([f"one plant, {1000 * _SWITCHING:g} ms"] if switching else [])]
+    ratios = [3] * len(columns) + [2] * (len(titles) - len(columns))
+    figure, axes = _panels(
+        len(arms), len(titles), 0.6 + 1.7 * len(arms), width_ratios=ratios, sharex="col", sharey=True
+    )
+    for column, chosen in zip(axes.T, columns.values(), strict=False):
         for outcome in chosen:
-            traces, panel = traced(outcome), column[arms.index(outcome.group.arm)]
-            low, high = (_alive(outcome, values) for values in (traces.u_low, traces.u_high))
-            some = np.isfinite(low).any(axis=1)
-            span = (np.nanmin(low[some], axis=1), np.nanmax(high[some], axis=1))
-            panel.fill_between(traces.time[some], *span, step="pre", color=_colour(outcome), alpha=0.2, linewidth=0.0)
-            _lines(panel, outcome, smooth(traces.time, traces.u_mean), label=False)
-    for panel, arm in zip(axes[:, 0], arms, strict=True):
-        panel.set_ylabel(f"$F$ (N)\n{ARMS[arm].title}")
-    for column in axes.T:
+            _force(column[arms.index(outcome.group.arm)], outcome)
         column[0].plot([], [], color="0.3", linewidth=0.8, label=f"mean over {WINDOW:g} s")
         column[0].fill_between([], [], color="0.3", alpha=0.2, linewidth=0.0, label="range")
-    return _finished(figure, axes, list(columns))
+    for outcome in switching:
+        _switching(axes[arms.index(outcome.group.arm), -1], outcome)
+    for panel, arm in zip(axes[:, 0], arms, strict=True):
+        panel.set_ylabel(f"{ARMS[arm].title}\n$F$ (N)".replace(" comp", "\ncomp"))
+    return _finished(figure, axes, titles)
+
+
+def _force(panel: Axes, outcome: Outcome) -> None:
+    """The range of all runs' forces, and each run's mean."""
+    traces = traced(outcome)
+    low, high = (_alive(outcome, values) for values in (traces.u_low, traces.u_high))
+    some = np.isfinite(low).any(axis=1)
+    span = (np.nanmin(low[some], axis=1), np.nanmax(high[some], axis=1))
+    panel.fill_between(traces.time[some], *span, step="pre", color=_colour(outcome), alpha=0.2, linewidth=0.0)
+    _lines(panel, outcome, smooth(traces.time, traces.u_mean), label=False)
+
+
+def _switching(panel: Axes, outcome: Outcome) -> None:
+    """The first run's force over every control period at the end of the start, as it is held."""
+    time, force = traced(outcome).time, _alive(outcome, traced(outcome).u)[:, 0]
+    until = min(START, time[-1])
+    shown = (time >= until - _SWITCHING - 1e-9) & (time <= until + 1e-9)
+    panel.plot(time[shown], force[shown], color=_colour(outcome), linewidth=0.8, drawstyle="steps-pre")
+    panel.locator_params(axis="x", nbins=2)
 
 
 def bars(columns: Mapping[str, Sequence[Result]], label: str) -> Figure:
@@ -103,11 +125,11 @@ def bars(columns: Mapping[str, Sequence[Result]], label: str) -> Figure:
         columns: results of each column by its controller's published name.
         label: of what the groups of bars are.
     """
-    figure, axes = _panels(2, len(columns), 4.2, sharex="col", sharey="row")
+    figure, axes = _panels(2, len(columns), 4.7, sharex="col", sharey="row")
     for column, (name, results) in zip(axes.T, columns.items(), strict=True):
         for panel, state in zip(column, ("h", "theta"), strict=True):
             _bars(panel, name, [r for r in results if r.cell.state == state])
-        _legend(column[0], TITLES[name])
+        _legend(column[0], TITLES[name], wide=len(columns) == 1)
         column[1].set_xlabel(label)
     for panel, (state, unit) in zip(axes[:, 0], _POSITIONS, strict=True):
         panel.set_ylabel(f"MSE of ${state}$ ({unit}$^2$)")
@@ -141,11 +163,12 @@ def _bars(panel: Axes, name: str, cells: Sequence[Result]) -> None:
 
 
 def smooth(time: Array, force: Array) -> Array:
-    """Forces (m, runs) averaged over :data:`WINDOW`."""
+    """Forces (m, runs) averaged over :data:`WINDOW`, or over what there is of it at either end."""
     window = max(int(np.searchsorted(time, WINDOW)), 1)
     from scipy.ndimage import uniform_filter1d  # only who draws waits for it
 
-    return np.asarray(uniform_filter1d(force, window, axis=0, mode="nearest"))
+    total, share = (uniform_filter1d(a, window, axis=0, mode="constant") for a in (force, np.ones((len(time), 1))))
+    return np.asarray(total / share)
 
 
 def traced(outcome: Outcome) -> Traces:
@@ -192,7 +215,7 @@ def _panels(rows: int, columns: int, height: float, **options: Any) -> tuple[Fig
 def _finished(figure: Figure, axes: NDArray[Any], titles: Sequence[str]) -> Figure:
     """What all figures of trajectories share: titles, axis of time, legends."""
     for column, title in zip(axes.T, titles, strict=True):
-        _legend(column[0], title)
+        _legend(column[0], title, wide=len(titles) == 1)
         column[-1].set_xlabel("$t$ (s)")
     for panel in axes.flat:
         panel.margins(x=0.0)
@@ -200,9 +223,9 @@ def _finished(figure: Figure, axes: NDArray[Any], titles: Sequence[str]) -> Figu
     return figure
 
 
-def _legend(panel: Axes, title: str) -> None:
+def _legend(panel: Axes, title: str, wide: bool) -> None:
     """A legend above the panel, where no line runs through it; a title alone where nothing has a name."""
     if panel.get_legend_handles_labels()[1]:
-        panel.legend(title=title, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
+        panel.legend(title=title, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2 if wide else 1)
     else:
         panel.set_title(title)
