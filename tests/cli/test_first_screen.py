@@ -62,7 +62,8 @@ def test_verbose_has_every_table_and_the_files_have_its_sentences(shown):
         "Table 4, LQR\n====",
         "Table 4, SMC\n====",
         "Diagnostics: RMS errors",
-        "Diagnostics: effort and peaks",
+        "Diagnostics: effort and variation of the force",
+        "Diagnostics: peaks",
     ):
         assert title in text
     assert len(re.findall("Reduction of the MSE by the compensation", text)) == 2

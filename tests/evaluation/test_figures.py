@@ -137,7 +137,7 @@ def test_errors_are_true_less_estimated(drawn, study_of_all, number, controller,
 
 
 def test_a_start_is_the_beginning_of_the_same_runs(study_of_all):
-    outcomes, starts, _ = study_of_all
+    _, starts, _ = study_of_all
     assert {start.group.name for start in starts} == {"lqr", "smc", "smc-tracking"}
     for start in starts:
         group = start.group

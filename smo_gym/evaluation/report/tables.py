@@ -157,7 +157,8 @@ _PLACE = 3
 """Table, controller, arm: the first columns of the diagnostics."""
 _PARTS = {
     "RMS errors of the estimate": slice(_PLACE, 7),
-    "effort and peaks": slice(7, 12),
+    "effort and variation of the force": slice(7, 9),
+    "peaks": slice(9, 12),
     "registered metrics, and runs that left the operating set of the theorem's gains": slice(12, None),
 }
 """Tables that the diagnostics are shown in, each narrow enough for a console."""
