@@ -2,14 +2,17 @@
 
     smo-gym train --env SMOPendulum-v0 --observation smo
 
-Writes a checkpoint to --out every twentieth of the way, from which the same command resumes; at the end the policy,
-policy.safetensors, and a card of what it is, where it comes from and what it was measured to do, policy.json.
+Writes a checkpoint to --out every twentieth of the way, from which the same command resumes, and with more --steps goes
+on from a finished training; at the end the policy, policy.safetensors, and a card of what it is, where it comes from
+and what it was measured to do, policy.json.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import math
+import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,11 +22,21 @@ from tqdm import tqdm
 from .. import files
 from ..evaluation import configs
 from ..wrappers.view import KINDS
+from . import starting
 from .arguments import Parser, fraction, versions, whole
 from .entry import Stop, command, typed
 
 DEFAULTS = {"ppo": "ppo", "recurrent": "ppo_lstm"}
 """Hyperparameters of each algorithm, by the name of their file."""
+COLUMNS = {
+    "steps": "steps",
+    "return": "return",
+    "standing": "standing, s",
+    "failed": "failed",
+    "mse_h": "MSE of h",
+    "mse_theta": "MSE of theta",
+}
+"""What is shown of each checkpoint: the key in the curve, and above its column."""
 PACKAGES = ("smo_gym", "gymnasium", "numpy", "stable-baselines3", "sb3-contrib", "torch")
 
 
@@ -59,7 +72,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
                 def show(steps: int, found: dict[str, float]) -> None:
                     bar.update(min(steps, run.steps) - bar.n)
-                    bar.set_postfix({key: f"{value:.4g}" for key, value in found.items()})
+                    bar.set_postfix(
+                        {key: f"{found[key]:.4g}" for key in ("return", "standing", "failed") if key in found}
+                    )
 
                 policy = training.train(run, out, show, args.tensorboard)
             told = {"command": typed("train", arguments), "versions": versions(PACKAGES)}
@@ -68,9 +83,25 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         where = f"; the same command resumes from the last checkpoint in {out}" if out else " before it began"
         raise Stop(f"interrupted{where}") from None
-    columns = ("steps", "runs", "failed", "mse_h", "mse_theta")
-    rows = [[point.get(column, float("nan")) for column in columns] for point in policy.card.curve]
-    print(f"While learning, over the environment's whole horizon on {rows[-1][1]} plants that learning does not see:\n")
-    print(tabulate(rows, columns, floatfmt=".4g"))
-    print(f"\nThe best of them, on others: {policy.card.measured}\nThe policy is {out / 'policy.safetensors'}")
+    curve = [[point.get(column, math.nan) for column in COLUMNS] for point in policy.card.curve]
+    measured = policy.card.measured
+    print(f"While learning, on {measured['runs']} plants that learning does not see:\n")
+    print(tabulate(curve, list(COLUMNS.values()), floatfmt=".4g"))
+    print(f"\nThe best of them, on others: {in_words(measured)}")
+    print(f"The policy is {out / 'policy.safetensors'}. To watch it:\n")
+    print(f"    {starting.line('watch')} {shlex.quote(str(out))}")
     return 0
+
+
+def in_words(measured: Mapping[str, float]) -> str:
+    """What a policy was measured to do, as a sentence."""
+    failed, runs, seconds = measured["failed"], measured["runs"], f"{measured['standing']:.3g} s"
+    stood = (
+        f"{failed} of {runs} runs failed; they stood {seconds} on average"
+        if failed
+        else f"none of {runs} runs failed in {seconds}"
+    )
+    errors = (
+        f"; MSE of h {measured['mse_h']:.3g} m^2, of theta {measured['mse_theta']:.3g} rad^2" if failed < runs else ""
+    )
+    return f"{stood}; return {measured['return']:.4g}{errors}."

@@ -7,6 +7,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from ..evaluation.rollout import rollout
+from ..loop import Loop
 from ..policies.frozen import MlpPolicy
 from ..wrappers import VectorObserverWrapper
 from ..wrappers.view import KINDS
@@ -20,18 +21,34 @@ def seeds(stream: int, n: int, *key: int) -> list[int]:
     return [int(seed) for seed in np.random.SeedSequence(key, spawn_key=(stream,)).generate_state(n)]
 
 
+class Returns:
+    """The sum of the rewards of every slot's episode."""
+
+    every = 1
+
+    def __init__(self, n: int) -> None:
+        self.total = np.zeros(n)
+
+    def look(self, k: int, loop: Loop) -> None:
+        """Add the rewards of the period that ends at instant k: 0 at the start and in slots that have ended."""
+        self.total += loop.reward
+
+
 def measure(policy: MlpPolicy, stream: int = TEST, runs: int = 100, horizon: float | None = None) -> dict[str, float]:
     """A policy on random plants and starts of its training, over the environment's own horizon or another.
 
     Returns:
-        Runs, how many failed, and the means of the others' MSE of h in m^2 and of theta in rad^2.
+        Runs, how many failed, the means over all of the return and of the time until the run failed or ended in s, and
+        over those that did not fail of the MSE of h in m^2 and of theta in rad^2.
     """
     card = policy.card
     options = {name: value for name, value in card.configuration["options"].items() if name != "horizon"}
     options |= {} if horizon is None else {"horizon": horizon}
     env = gymnasium.make_vec(card.environment, runs, autoreset_mode=AutoresetMode.DISABLED, **options)
     observer = KINDS[card.observation].observer
-    outcome = rollout(VectorObserverWrapper(env, **observer) if observer else env, policy, seed=seeds(stream, 1)[0])
+    seen, returns = VectorObserverWrapper(env, **observer) if observer else env, Returns(runs)
+    outcome = rollout(seen, policy, seed=seeds(stream, 1)[0], recorders=[returns])
     stood = ~outcome.failed
     means = {name: float(outcome.metrics[name][stood].mean()) for name in ("mse_h", "mse_theta")} if stood.any() else {}
-    return {"runs": int(runs), "failed": int(outcome.failed.sum()), **means}
+    of_all = {"return": float(returns.total.mean()), "standing": float(outcome.metrics["duration"].mean())}
+    return {"runs": int(runs), "failed": int(outcome.failed.sum()), **of_all, **means}

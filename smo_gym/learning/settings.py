@@ -54,10 +54,13 @@ class Run:
     """Options of the environment."""
     hyperparameters: dict[str, Any]
     """Hyperparameters of the algorithm."""
+    continues: tuple[int, ...] = ()
+    """The steps of finished runs that this one goes on from, each of the one before."""
 
     def plain(self) -> dict[str, Any]:
-        """The run as JSON has it."""
-        return dict(plain_data(self))
+        """The run as JSON has it; without ``continues`` where it begins anew."""
+        found = dict(plain_data(self))
+        return found if self.continues else {name: found[name] for name in found if name != "continues"}
 
     def checked(self) -> Run:
         """The run itself, when an environment and an algorithm can be made of it.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import json
 import math
 import warnings
 from collections.abc import Callable
@@ -17,9 +16,10 @@ from gymnasium.vector import AutoresetMode
 
 from .. import files
 from ..policies.frozen import Card, LstmPolicy, MlpPolicy
-from ..validation import short, whole
+from ..validation import whole
 from ..wrappers.view import KINDS, units
 from .measurement import TRAINING, VALIDATION, measure, seeds
+from .resuming import agree, continued, keep, see_best
 from .sb3 import SB3VecEnv, layers, lstm_weights
 from .settings import Run, learner, make
 
@@ -75,7 +75,7 @@ class Watch(BaseCallback):
         self._fresh = True
 
     def _on_rollout_start(self) -> None:
-        if self.num_timesteps % self._every == 0:
+        if self._fresh or self.num_timesteps % self._every == 0:
             if not self._fresh:
                 self.keep()
             self._restart()
@@ -177,6 +177,9 @@ def train(
 ) -> MlpPolicy:
     """Train, or go on from the checkpoint in ``folder``.
 
+    A run that is longer than a finished one there, and alike in all else, goes on from it: schedules are those of the
+    longer run from there on, so what comes out is not what the longer run would have learned in one go.
+
     Args:
         run: what to train.
         folder: of the checkpoint, which holds a run of exactly these settings or none.
@@ -189,9 +192,9 @@ def train(
 
     Raises:
         ValueError: hyperparameters that nothing can be made of, or a network that cannot be frozen; the folder holds
-            a run of other settings, or a checkpoint that cannot be read or stands alone.
+            a run of other settings, an unfinished shorter one, or a checkpoint that cannot be read or stands alone.
     """
-    checkpoint = folder / "checkpoint.pt"
+    checkpoint, settings = folder / "checkpoint.pt", folder / "run.json"
     env = VecMonitor(SB3VecEnv(make(run, run.n_envs, AutoresetMode.SAME_STEP)))
     log = str(folder / "tensorboard") if tensorboard else None
     begun = checkpoint.exists()
@@ -199,64 +202,25 @@ def train(
         files.refuse_pickle(folder / "checkpoint.zip")
     model = learner(run, env, log)
     frozen(model, run)  # what cannot be frozen is noticed now, not at the first checkpoint
-    agree(folder / "run.json", run.plain(), begun)
+    there, run = continued(settings, run) if begun else (run.plain(), run)
+    agree(settings, there, begun)
     if begun:
         restore(model, checkpoint)
-        _see_best(folder, run)
+        see_best(folder / BEST, run)
+        if there["steps"] < run.steps:
+            if model.num_timesteps < there["steps"]:
+                raise ValueError(
+                    f"steps={run.steps}: {folder} holds an unfinished run of {there['steps']} steps: finish it "
+                    "first, or choose another --out"
+                )
+            keep(settings, run.plain())
     watch = Watch(run, checkpoint, progress)
     progress(model.num_timesteps, {})
     if model.num_timesteps < run.steps:
         model.learn(run.steps - model.num_timesteps, callback=watch, reset_num_timesteps=False, tb_log_name="run")
         watch.keep()
     policy = MlpPolicy.load(folder / BEST)
-    card = policy.card.model_copy(update={"curve": curve(model), "measured": measure(policy)})
+    card = policy.card.model_copy(
+        update={"configuration": run.plain(), "curve": curve(model), "measured": measure(policy)}
+    )
     return replace(policy, card=card)
-
-
-def _see_best(folder: Path, run: Run) -> None:
-    """See now, and not when all is learned, that the best policy so far is there."""
-    try:
-        if MlpPolicy.load(folder / BEST).card.configuration != run.plain():
-            raise ValueError(f"{folder / BEST}: is of another run")
-    except ValueError as error:
-        raise ValueError(f"{error}: the checkpoint goes on from it; empty the folder to begin anew") from None
-
-
-def agree(path: Path, settings: dict[str, Any], begun: bool) -> None:
-    """Write the settings of a run, or see that those that stand there are the same.
-
-    Raises:
-        ValueError: they are not, and the differences are named; or a run has begun here and they are missing.
-    """
-    wanted = json.loads(json.dumps(settings))
-    if not (begun or path.exists()):
-        files.write(path, json.dumps(wanted, indent=1) + "\n")
-        return
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(found, dict):
-            raise ValueError(f"{found!r} is no mapping of settings")
-    except (OSError, ValueError, RecursionError) as error:
-        raise ValueError(
-            f"{path}: cannot be read ({error}): it says what run the checkpoint is of; empty the folder to begin anew"
-        ) from None
-    if found != wanted:
-        there, here = _flat(found), _flat(wanted)
-        differences = [
-            f"{name} is {short(there[name]) if name in there else 'missing'} there and "
-            f"{short(here[name]) if name in here else 'missing'} here"
-            for name in there | here
-            if there.get(name) != here.get(name) or (name in there) != (name in here)
-        ]
-        raise ValueError(
-            f"{path.parent} holds a run with another configuration: {'; '.join(differences)}. Choose another --out, or "
-            "remove that folder to begin anew"
-        )
-
-
-def _flat(data: dict[str, Any], above: str = "") -> dict[str, Any]:
-    """Nested mappings as one, with dotted names."""
-    found: dict[str, Any] = {}
-    for name, value in data.items():
-        found |= _flat(value, f"{above}{name}.") if isinstance(value, dict) else {f"{above}{name}": value}
-    return found
