@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SCRIPTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["scripts"]
 MODULE = [sys.executable, "-m", "smo_gym"]
 SHARED = {
+    "answer",
     "arguments",
     "cluster",
     "commands",
