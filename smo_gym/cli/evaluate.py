@@ -254,7 +254,7 @@ def draw(
     """The figures, as a set of files."""
     made: dict[str, str | bytes] = {}
     for plan in tqdm(drawn, unit="figure", leave=False, disable=None):
-        figure = figures.draw(plan, outcomes, starts, numbers)
+        figure = figures.draw(plan, outcomes, numbers, starts)
         made |= {drawing(plan, form): figures.encode(figure, form) for form in figures.FORMATS}
     if made:
         files.write_set(out, made)

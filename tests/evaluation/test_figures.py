@@ -26,7 +26,7 @@ def study_of_all():
     scenarios = [load(name, **({} if name == "tracking" else {"horizon": 5.0})) for name in NAMES]
     outcomes = study.measure(study.groups(scenarios, ["lqr", "smc"], ["without", "with"], 12), seed=0, samples=100)
     starts = study.measure(figures.starts(figures.PLANS, (o.group for o in outcomes)), seed=0, samples=figures.DENSE)
-    return outcomes, starts, statistics.results(outcomes)
+    return outcomes, statistics.results(outcomes), starts
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def drawn(study_of_all):
 
 
 def shown(study_of_all, controller, table, arm, level=0.2, case="", start=False):
-    groups = ((o, o.group) for o in study_of_all[start])
+    groups = ((o, o.group) for o in study_of_all[2 if start else 0])
     wanted = (table, controller, arm, level, case)
     (outcome,) = (o for o, g in groups if (g.scenario.table, g.name, g.arm, g.uncertainty, g.case) == wanted)
     return outcome
@@ -73,7 +73,7 @@ def test_traces_of_no_instants_or_none_at_all_are_refused(study_of_all):
         study.measure(groups, seed=0, samples=0)
     nothing = [study.Outcome(o.group, o.metrics, o.failed) for o in study_of_all[0]]
     with pytest.raises(ValueError, match="lqr has no traces to draw"):
-        figures.draw(figures.PLANS[0], nothing, [], [])
+        figures.draw(figures.PLANS[0], nothing, [])
 
 
 def test_every_figure_of_the_article_is_planned_once():
@@ -137,7 +137,7 @@ def test_errors_are_true_less_estimated(drawn, study_of_all, number, controller,
 
 
 def test_a_start_is_the_beginning_of_the_same_runs(study_of_all):
-    _, starts, _ = study_of_all
+    *_, starts = study_of_all
     assert {start.group.name for start in starts} == {"lqr", "smc", "smc-tracking"}
     for start in starts:
         group = start.group
@@ -171,7 +171,7 @@ def test_switching_is_fifty_milliseconds_at_every_control_instant(number):
     groups = [g for g in groups if g.scenario.table == ("4" if number == 8 else "7")]
     (plan,) = (plan for plan in figures.PLANS if plan.number == number)
     starts = study.measure(figures.starts([plan], groups), seed=0, samples=figures.DENSE)
-    figure = figures.draw(plan, starts, starts, [])
+    figure = figures.draw(plan, starts, [], starts)
     assert len(starts) == 2
     for panel, start in zip(figure.axes[1::2], starts, strict=True):
         (line,) = (line for line in panel.lines if len(line.get_xdata()) > 2)
@@ -212,7 +212,7 @@ def test_bars_are_the_measured_and_published_numbers(drawn, study_of_all, number
             assert to_rgba(panels.COLOURS[controller][arm]) == bar.patches[0].get_edgecolor()
             cells = {
                 getattr(r, label)
-                for r in study_of_all[2]
+                for r in study_of_all[1]
                 if (r.cell.table, r.cell.controller, r.cell.state, r.cell.compensation, r.cell.metric)
                 == (plan.table, controller, state, arm, "mse")
             }
@@ -247,7 +247,7 @@ def test_one_arm_of_one_plant_is_drawn_too():
     drawn, left_out = figures.planned([outcome.group for outcome in outcomes])
     assert [plan.number for plan in drawn] == [14, 15, 16, 17]
     assert len(drawn) + len(left_out) == 15
-    states, bars, _, inputs = (figures.draw(plan, outcomes, starts, results) for plan in drawn)
+    states, bars, _, inputs = (figures.draw(plan, outcomes, results, starts) for plan in drawn)
     assert "1 plant at 0 %" in states.get_suptitle()
     assert [panel.get_legend().get_title().get_text() for panel in states.axes[:1]] == ["with compensation"]
     assert bars.axes[0].containers[-1].get_label() == "with, measured"
@@ -258,7 +258,7 @@ def test_failed_runs_end_where_they_failed():
     table5 = load("initial-conditions", horizon=3.0, track_limit=1.03)
     outcomes = study.measure(study.groups([table5], ["lqr"], ["without", "with"], 3), seed=0, samples=100)
     (plan,) = (plan for plan in figures.PLANS if plan.number == 9)
-    figure = figures.draw(plan, outcomes, [], [])
+    figure = figures.draw(plan, outcomes, [])
     failed = [o for o in outcomes if plan.shows(o.group) and o.group.uncertainty and o.failed.any()]
     assert "3 of 6 runs failed and end there" in figure.get_suptitle()
     line = lines(figure.axes[0], panels.COLOURS["lqr"][failed[0].group.arm])[0]

@@ -138,14 +138,14 @@ def starts(drawn: Iterable[Plan], groups: Iterable[Group]) -> list[Group]:
     ]
 
 
-def draw(plan: Plan, outcomes: Iterable[Outcome], starts: Iterable[Outcome], results: Iterable[Result]) -> Figure:
+def draw(plan: Plan, outcomes: Iterable[Outcome], results: Iterable[Result], starts: Iterable[Outcome] = ()) -> Figure:
     """Draw one of the article's figures from our runs.
 
     Args:
         plan: of :data:`PLANS`.
         outcomes: of :func:`smo_gym.evaluation.study.measure`, with traces.
-        starts: what :func:`starts` names, measured with :data:`DENSE` samples, for errors and inputs.
         results: of :func:`smo_gym.evaluation.statistics.results`, for the bars.
+        starts: what :func:`starts` names, measured with :data:`DENSE` samples, for errors and inputs.
 
     Raises:
         ValueError: the outcomes have no traces.
