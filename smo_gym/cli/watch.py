@@ -210,7 +210,7 @@ def show(instants: Any) -> tuple[recording.Instant, bool]:
 def told(what: str, last: recording.Instant, closed: bool = False) -> str:
     """How a run ended, in a sentence."""
     h, theta = last.state[:2]
-    end = "failed" if last.failed else "was closed" if closed else "stands"
+    end = "failed" if last.failed else "was closed" if closed else "ends"
     off = np.abs(last.estimate - last.state)
     return (
         f"{what}: {end} after {last.time:.4g} s at h = {h:.3g} m, theta = {theta:.3g} rad; the estimate is off by "

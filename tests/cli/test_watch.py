@@ -31,7 +31,7 @@ def test_a_run_is_written(arguments, tmp_path, capsys):
     for name in ("run.gif", "new/run.webp"):
         assert watch.main([*arguments, *SHORT, "--out", str(tmp_path / name)]) == 0, capsys.readouterr().err
         assert frames(tmp_path / name) == 6
-    assert "stands after 0.2 s" in capsys.readouterr().out
+    assert "ends after 0.2 s" in capsys.readouterr().out
 
 
 def test_a_video_is_written(tmp_path):
@@ -53,7 +53,7 @@ def test_a_trainings_folder_is_its_policy_in_its_environment(tmp_path, capsys):
 def test_a_window_shows_it_until_somebody_closes_it(monkeypatch, capsys):
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     assert watch.main([*SHORT]) == 0
-    assert "stands after 0.2 s" in capsys.readouterr().out
+    assert "ends after 0.2 s" in capsys.readouterr().out
     monkeypatch.setattr(watch, "closed_by_user", lambda: True)
     assert watch.main([*SHORT]) == 0
     assert "was closed after 0.001 s" in capsys.readouterr().out
