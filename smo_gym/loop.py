@@ -2,9 +2,10 @@
 
 ::
 
-    act       a control period begins   law, actuator              from xhat to u
-    sample    at every sampling instant plant, sensor, observer    from u to x, y, xhat
-    close     the control period ends   guard, metrics, end        what is said of it
+    act       a control period begins   law, actuator                        from xhat to u
+    sample    at every sampling instant actuator, disturbance, plant         from u to x
+                                        sensor, observer                     from x to y, xhat
+    close     the control period ends   guard, metrics, end                  what is said of it
 
 A component puts a :class:`Part` into the loop; the loop owns the rows. It is driven whole control periods at a time by
 one compiled function, whatever its parts are, and a slot's bits depend neither on how many periods one call drives nor
@@ -22,17 +23,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .kernels.batch import LANES, for_slots
-from .kernels.blocks import ALIVE, FAILED, REWARD, SIGNALS, XD, XHAT, Y0, Block, U, X, Y, address
+from .kernels.blocks import ALIVE, FAILED, FORCE, REWARD, SIGNALS, XD, XHAT, Y0, Block, U, X, Y, address
 from .kernels.driver import drive
 from .typing import Array, Flags
 
-ROLES = ("law", "actuator", "plant", "sensor", "observer", "guard", "metrics", "end")
+ROLES = ("law", "actuator", "disturbance", "plant", "force sensor", "sensor", "observer", "guard", "metrics", "end")
 """The order in which parts are called; parts of other names follow in the order of their names."""
 _MICROSECONDS_A_STEP = 0.05  # of one slot: decides when a second thread is worth waking
 Slots = Flags | NDArray[np.intp] | slice
 
 _NO_INSTANTS = np.empty((0, 4))
 _NO_SAMPLES = np.empty((0, 2, 0))
+_NO_READINGS = np.empty((0, 6, 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,8 @@ class Part:
         act: block that is called when a control period begins.
         sample: block that is called at every sampling instant.
         close: block that is called when a control period ends.
+        reads: of a sensor, whether its block is called when a run begins, too, for the first reading; else that is the
+            true one.
         xhat: of an observer, the estimate that it begins with, (4, n); None for [y, 0, 0].
         alike: numbers that must be the same in all slots that share a call of these blocks.
     """
@@ -54,11 +58,12 @@ class Part:
     close: Block | None = None
     xhat: Array | None = None
     alike: tuple[float, ...] = ()
+    reads: bool = False
 
     @property
     def kind(self) -> tuple[Any, ...]:
         """What two parts must have in common to be one: blocks, number of rows and what is alike."""
-        return (self.act, self.sample, self.close, len(self.rows), self.xhat is None, self.alike)
+        return (self.act, self.sample, self.close, len(self.rows), self.xhat is None, self.alike, self.reads)
 
 
 def columns(n: int, *groups: Any) -> Array:
@@ -84,6 +89,7 @@ def side_by_side(parts: Iterable[Part]) -> list[Part]:
             group[0].close,
             None if group[0].xhat is None else np.hstack([part.xhat for part in group if part.xhat is not None]),
             group[0].alike,
+            group[0].reads,
         )
         for group in found
     ]
@@ -181,19 +187,47 @@ class Loop:
         return self.rows[self._own[role]]
 
     def begin(self, slots: Slots, x: Array) -> None:
-        """Put some slots at states ``x`` (4, slots), where the encoders are right; parts stay as they are."""
+        """Put some slots at states ``x`` (4, slots) and read the sensor; other parts stay as they are."""
         rows = self.rows
         rows[X : X + 4, slots] = x
         rows[Y0 : Y0 + 2, slots] = rows[Y : Y + 2, slots] = x[:2]
         rows[U, slots] = rows[FAILED, slots] = rows[REWARD, slots] = 0.0
-        rows[XD : XD + 4, slots] = 0.0
+        rows[XD : XD + 4, slots] = rows[FORCE:SIGNALS, slots] = 0.0
         rows[ALIVE, slots] = 1.0
+        if any(part.reads for part in self.parts.get("sensor", ())):
+            self._read(slots)
+
+    def _read(self, slots: Slots) -> None:
+        """The sensors' first readings: as of one sampling instant at which nothing else happens."""
+        begun = np.arange(self.n)[slots]
+        own = self._own["sensor"]
+        for start, stop, _, _, _ in self._sections:
+            mine = begun[(begun >= start) & (begun < stop)]
+            part = self.part_of("sensor", start)
+            if len(mine) == 0 or not part.reads:
+                continue
+            rows = np.ascontiguousarray(self.rows[:, mine])
+            program: Any = np.array([[address(part.sample), own.start, own.start + len(part.rows)]], dtype=np.int64)
+            drive(0, len(mine), rows, program, 0, 1, 0, 1, 1, _NO_INSTANTS, _NO_SAMPLES, _NO_SAMPLES, _NO_READINGS)
+            rows[Y0 : Y0 + 2] = rows[Y : Y + 2]
+            self.rows[:, mine] = rows
+
+    def part_of(self, role: str, slot: int) -> Part:
+        """The part that serves a slot in a role."""
+        for part in self.parts[role]:
+            slot -= part.rows.shape[1]
+            if slot < 0:
+                return part
+        raise IndexError(f"the loop has {self.n} slots")
 
     def start(self, slots: Slots, x: Array) -> None:
         """Begin anew in some slots, at states ``x`` (4, slots), with all parts as they were at the beginning."""
-        self.begin(slots, x)
         for role in self.parts:
-            self.restart(role, slots)
+            if role != "observer":  # it begins with what the sensor reads
+                self.restart(role, slots)
+        self.begin(slots, x)
+        if "observer" in self.parts:
+            self.restart("observer", slots)
 
     def restart(self, role: str, slots: Slots) -> None:
         """Bring a part's own rows, and of an observer the estimate, to what they begin as."""
@@ -234,6 +268,7 @@ class Loop:
         reference: Array = _NO_INSTANTS,
         recording: Array = _NO_SAMPLES,
         positions: Array = _NO_SAMPLES,
+        readings: Array = _NO_READINGS,
     ) -> None:
         """Drive whole control periods; arguments as of :func:`smo_gym.kernels.driver.drive`.
 
@@ -245,10 +280,12 @@ class Loop:
             raise ValueError(f"positions has shape {positions.shape}, it must have shape {(substeps, 2, self.n)}")
         if recording is not _NO_SAMPLES and recording.shape != (substeps, 2, self.n):
             raise ValueError(f"recording has shape {recording.shape}, it must have shape {(substeps, 2, self.n)}")
+        if readings is not _NO_READINGS and readings.shape != (substeps, 6, self.n):
+            raise ValueError(f"readings has shape {readings.shape}, it must have shape {(substeps, 6, self.n)}")
         if len(reference) and (len(reference) <= end * substeps or reference.shape[1:] != (4,)):
             raise ValueError(f"reference has shape {reference.shape}, it must have {end * substeps + 1} rows of 4")
         for start, stop, program, acts, each in self._sections:
-            told: Any = (rows, program, acts, each, begin, end, substeps, reference, recording, positions)
+            told: Any = (rows, program, acts, each, begin, end, substeps, reference, recording, positions, readings)
             if stop - start <= LANES:
                 drive(start, stop, *told)
             else:

@@ -26,10 +26,11 @@ def offsets(*sizes: int) -> tuple[int, ...]:
     return tuple(accumulate(sizes, initial=0))
 
 
-X, Y0, Y, XHAT, U, XD, ALIVE, FAILED, REWARD, SIGNALS = offsets(4, 2, 2, 4, 1, 4, 1, 1, 1)
-"""Rows of what components exchange: the state; the measurement one sample ago and now; the estimate; the force; where
-the state should be; 1 while a run goes on; 1 from where it fails on; the reward of the last control
-period."""
+X, Y0, Y, XHAT, U, XD, ALIVE, FAILED, REWARD, FORCE, PUSH, STAMP, SIGNALS = offsets(4, 2, 2, 4, 1, 4, 1, 1, 1, 1, 2, 1)
+"""Rows of what components exchange: the state; the measurement one sample ago and now; the estimate; the force that is
+asked for, within the limit; where the state should be; 1 while a run goes on; 1 from where it fails on; the reward of
+the last control period. Where they are not ideal, over the sampling period: the mean force that reaches the cart; a
+disturbance's force on the cart and torque about the pivot; and how much later than its instant a sample was taken."""
 
 
 @inlined

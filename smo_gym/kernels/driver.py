@@ -5,7 +5,7 @@ import numpy as np
 from ..typing import Array
 from . import kernel
 from .batch import LANES, VECTOR, load, store
-from .blocks import ALIVE, FAILED, XD, XHAT, Y0, X, Y, call
+from .blocks import ALIVE, FAILED, FORCE, XD, XHAT, Y0, X, Y, call
 
 _LOOK = 16
 """After every so many control periods a block of slots is left that all had ended before: now their force is 0, too."""
@@ -25,6 +25,7 @@ def drive(
     reference: Array,
     recording: Array,
     positions: Array,
+    readings: Array,
 ) -> None:
     """Control periods ``begin`` to ``end`` of slots ``start`` to ``stop``.
 
@@ -41,6 +42,7 @@ def drive(
         reference: x_d at each sampling instant from the very first on, (instants, 4), alike in all slots; or empty.
         recording: measurements in place of a sensor's, (substeps, 2, n), of a single period; or empty.
         positions: filled with the true positions of the last period, (substeps, 2, n); or empty.
+        readings: filled with what was measured in it, the rows Y and FORCE to STAMP, (substeps, 6, n); or empty.
     """
     work, kept = np.empty(rows.shape[0] * LANES), np.empty(4 * LANES)
     for first in range(start, stop, LANES):
@@ -66,6 +68,9 @@ def drive(
                     call(program[p, 0], work, work[program[p, 1] * LANES : program[p, 2] * LANES], width)
                 if positions.shape[0] > 0:
                     store(work, X, positions[j], first, lanes)
+                if readings.shape[0] > 0:
+                    store(work, Y, readings[j, :2], first, lanes)
+                    store(work, FORCE, readings[j, 2:], first, lanes)
             for p in range(acts + samples, program.shape[0]):
                 call(program[p, 0], work, work[program[p, 1] * LANES : program[p, 2] * LANES], width)
             # an observer goes on in slots that have ended, for how long depends on the others: they show none of it
