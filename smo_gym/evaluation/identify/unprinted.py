@@ -24,7 +24,7 @@ from ..arms import PRINTED
 from ..rollout import rollout
 from ..scenario import Scenario
 from ..settings import LqrSettings, SmcSettings
-from ..study import deviations as draws
+from ..draws import deviations as draws
 from .search import Hypothesis
 
 STATES = ("h", "theta")
