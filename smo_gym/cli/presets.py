@@ -1,7 +1,7 @@
 """The sensors, actuators, friction and disturbances that have a name, with the source of their numbers.
 
-    smo-gym presets                    # all
-    smo-gym presets sensor cart-pole   # one, every field of it
+smo-gym presets                    # all
+smo-gym presets sensor cart-pole   # one, every field of it
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
 """What sensors and actuator say of a control period: the measurements and forces that infos tell, and the truth."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass

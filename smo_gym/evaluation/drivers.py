@@ -100,7 +100,7 @@ def asked(
         return observation[:, -4:].T if observed else np.full((4, n), np.nan)
 
     loop.start(_EVERY, info["state"].T)
-    loop.xhat[:] = estimate()
+    loop.xhat[:], loop.y[:] = estimate(), observation[:, :2].T
     watch.look(0, loop)
     failed = np.zeros(n, dtype=np.bool_)
     unit = unit_of(agent, task)
@@ -126,6 +126,7 @@ def asked(
         if "desired" in info:
             reference[1:, :2] = info["desired"][np.argmin(failed)]  # of a slot whose time goes on
         loop.run(0, 1, reference, recording=np.ascontiguousarray(info["positions"].transpose(1, 2, 0)))
+        loop.y[:] = observation[:, :2].T
         lost = diverged(observation) | info.get("estimate_failed", False)
         if hold is not None and np.count_nonzero(lost):
             hold(lost)

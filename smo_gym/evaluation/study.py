@@ -287,9 +287,10 @@ def _split(traces: Traces | None, sizes: Sequence[int]) -> Sequence[Traces | Non
     """Traces of all slots as one a group."""
     if traces is None:
         return [None] * len(sizes)
-    of_slots = (traces.x, traces.xhat, traces.u, traces.u_low, traces.u_high, traces.u_mean)
-    parts = (np.split(values, np.cumsum(sizes)[:-1], axis=-1) for values in of_slots)
-    return [
-        Traces(traces.time, x, xhat, u, low, high, mean, traces.x_d)
-        for x, xhat, u, low, high, mean in zip(*parts, strict=True)
-    ]
+    whole: dict[str, Any] = {field.name: getattr(traces, field.name) for field in fields(Traces)}
+    apart = {
+        name: np.split(values, np.cumsum(sizes)[:-1], axis=-1)
+        for name, values in whole.items()
+        if values is not None and name not in ("time", "x_d")
+    }
+    return [Traces(**{**whole, **{name: parts[i] for name, parts in apart.items()}}) for i in range(len(sizes))]
