@@ -1,8 +1,9 @@
-"""sin, cos and tanh without a call or a branch, so that a loop over a batch becomes vector instructions.
+"""sin, cos, tanh and log without a call or a branch, so that a loop over a batch becomes vector instructions.
 
 The polynomials are near-minimax (interpolation at Chebyshev nodes in 50 digits); their own relative error is below
 5e-17 on the reduced range. Measured against the correctly rounded value: sin and cos within 2.3e-16 (absolute) for
-``|x| < 1e5``, tanh within 9e-16 (relative) everywhere. NaN goes in and comes out.
+``|x| < 1e5``, tanh within 9e-16 (relative) everywhere; NaN goes in and comes out. log is within 1 unit in the last
+place.
 """
 
 import math
@@ -21,6 +22,8 @@ _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 _TWO_OVER_LN2 = 2.8853900817779268
 # tanh rounds to 1 beyond 19.1.
 _TANH_SATURATED = 20.0
+_ROOT_HALF, _ONE, _MANTISSA = 0x3FE6A09E667F3BCD, 0x3FF0000000000000, 0x000FFFFFFFFFFFFF
+_TWO_TO_52 = 0x4330000000000000
 
 
 @instruction(interpreted.fma)
@@ -108,3 +111,24 @@ def tanh(x: float) -> float:
     power = _from_bits((_bits(shifted) + 1023) << 52)  # 2**n
     e = fma(power, p, power - 1.0)
     return math.copysign(e / (e + 2.0), x)
+
+
+@inlined
+def log(x: float) -> float:
+    """The natural logarithm of a positive, finite, normal number.
+
+    ``x = 2^n (1 + f)`` with ``1 + f`` in [sqrt 1/2, sqrt 2) and ``log(1 + f) = 2 atanh(f / (2 + f))``.
+    """
+    shifted = _bits(x) + (_ONE - _ROOT_HALF)
+    n = _from_bits((shifted >> 52) & 0x7FF | _TWO_TO_52) - 4503599627371519.0  # 2^52 + 1023
+    f = _from_bits((shifted & _MANTISSA) + _ROOT_HALF) - 1.0
+    s = f / (2.0 + f)
+    z = s * s
+    p = fma(z, 0.14616449685043406, 0.15331721600556042)
+    p = fma(z, p, 0.18182889125261723)
+    p = fma(z, p, 0.2222221113479508)
+    p = fma(z, p, 0.28571428625975487)
+    p = fma(z, p, 0.39999999999899505)
+    p = fma(z, p, 0.666666666666667)
+    half = 0.5 * f * f
+    return fma(n, _LN2_HIGH, f - (half - fma(n, _LN2_LOW, s * fma(z, p, half))))
