@@ -44,9 +44,9 @@ def _suite(name: str, noise: float, delay: int, probability: float, steps: int) 
         update_period=(0.01, 0.01),
         delay=(10 * delay, 10 * delay),
         dropout=(probability / 10.0, probability / 10.0),
-        dropout_samples=10 * steps,
+        dropout_samples=(10 * steps, 10 * steps),
         stuck=(probability / 10.0, probability / 10.0),
-        stuck_samples=10 * steps,
+        stuck_samples=(10 * steps, 10 * steps),
     )
     return Preset(sensor, _SUITE.format(name, noise, delay, probability, steps))
 
@@ -67,7 +67,6 @@ SENSORS = {
     ),
     "cart-pole": Preset(
         Sensor(
-            scale=(1.0, 1.0 / 0.96),
             dead_zone=(0.0, 1.15),
             dead_width=(0.0, 0.25),
             noise=(0.0, 1.2e-3),
@@ -75,7 +74,7 @@ SENSORS = {
             resolution=(8.498e-5, _TURN / 4096),
             update_period=(0.02, 0.02),
             dropout=(9e-5, 9e-5),
-            dropout_samples=20,
+            dropout_samples=(20, 20),
         ),
         f"{_CART_POLE}: counts of 85 um and 2 pi / 4096 of reading; noise of 0.80 counts at rest to 1.25 beyond 9 rad/s; "
         "1 rad of reading is 0.96 rad; the reading sticks from 1.15 rad on for 0.25 rad; 0.18 % of samples missing; its "

@@ -77,5 +77,5 @@ class Hearing:
         if task.actuator.measured:
             more["forces"] = forces.copy()
         samples = positions.copy() if task.sensor.exact else readings[:, :2].copy()
-        force = asked.copy() if task.actuator.ideal else forces.mean(axis=0)
+        force = asked.copy() if task.actuator.ideal else np.cumsum(forces, axis=0)[-1] / len(forces)
         return Heard(positions, samples, asked, force, more)

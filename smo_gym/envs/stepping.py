@@ -79,7 +79,7 @@ def begin(loop: Loop, task: Task, slots: Slots, cases: Sequence[Case]) -> None:
     if task.sensor.random:
         loop.own("sensor")[sensors.KEY, slots] = keys
     if task.disturbance:
-        loop.own("disturbance")[disturbances.KEY, slots] = keys
+        disturbances.begin(loop.own("disturbance"), slots, task.disturbance, keys)
     loop.begin(slots, np.array([case.state for case in cases]).T)
 
 
