@@ -44,15 +44,15 @@ class Sensor:
 
     ::
 
-        jitter          y = x(t_k + tau) = x + tau x'        tau normal, cut at half a sampling period
+        jitter          y = x(t_k + tau) = x + tau x'         tau normal, cut at half a sampling period
         scale, bias     y = scale y + bias
-        dead zone       y = the last reading outside         while y is in [dead_zone, dead_zone + dead_width)
-        stuck           y = the one before                   for stuck_samples samples, with probability stuck
-        noise           y = y + (noise + speed_noise |x'|) w w standard normal, white, independent of the other channel
+        dead zone       y = the last reading outside          while y is in [dead_zone, dead_zone + dead_width)
+        stuck           y = the one before                    for stuck_samples samples, with probability stuck
+        noise           y = y + (noise + speed_noise |x'|) w  w standard normal, white, of each channel its own
         resolution      y = the nearest multiple of it
-        update period   y = the one of the last update       updates at t = 0 and every update_period
-        delay           y = the one of sample k - d          the first one for k < d
-        dropout         y = what was delivered last          for dropout_samples samples, with probability dropout
+        update period   y = the one of the last update        updates at t = 0 and every update_period
+        delay           y = the one of sample k - d           the first one for k < d
+        dropout         y = what was delivered last           for dropout_samples samples, with probability dropout
 
     The first reading of an episode is never stuck or lost, and where it is in a dead zone it is where that zone begins.
     Runs that have ended keep their last reading.
@@ -188,16 +188,16 @@ class Sensor:
             return exact(n)
         least = self.delay if self.delay_least is None else self.delay_least
         resolution = [count or 0.0 for count in self.resolution or (None, None)]
-        none, ever = np.zeros(2), np.zeros(1)
         settings = [
-            *(ever, ever, self.scale, self.bias, self.dead_zone, self.dead_width, none),
-            *(self.stuck, self.stuck_samples, none, none),
-            *(self.noise, self.speed_noise, resolution, self._updates(dt), none),
-            *(self.delay, least, self.hold, least, none, none, self.dropout, self.dropout_samples, none),
-            *([self.jitter, 0.5 * dt], np.zeros(4 + sum(self.delay))),
+            *(self.scale, self.bias, self.dead_zone, self.dead_width, self.stuck, self.stuck_samples, (0.0, 0.0)),
+            *(self.noise, self.speed_noise, resolution, self._updates(dt), self.delay, least, self.hold),
+            *(self.dropout, self.dropout_samples, (0.0, 0.0), (self.jitter, 0.5 * dt)),
         ]
-        column = np.concatenate([np.asarray(group, dtype=np.float64) for group in settings])
-        return Part(columns(n, column), sample=sensing.sense, alike=tuple(column.tolist()), reads=True)
+        column = np.zeros(sensing.REGISTER + 2 + sum(self.delay))
+        column[sensing.SCALE : sensing.OUTSIDE] = np.concatenate(settings)
+        column[sensing.LAG : sensing.TO] = least
+        alike = tuple(column[: sensing.OUTSIDE].tolist())
+        return Part(columns(n, column), sample=sensing.sense, alike=alike, reads=True)
 
 
 def _size(name: str, value: Any) -> float:

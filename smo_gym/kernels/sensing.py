@@ -12,20 +12,23 @@ from .blocks import ALIVE, STAMP, Y0, X, Y, at, block, four, offsets, put, put_t
 from .elementary import rounded
 from .noise import STREAMS, two_normals, uniform
 
-_NOISE, _JITTER, _STUCK, _LAG, _HOLD, _DROPOUT = 0, 2, 4, 6, 8, 10
-"""Streams, two each: of the two uniforms that make two normals, else of the two channels."""
-TURN = 6.283185307179586
-_SAMPLES, _LEFT = 2, 4  # rows behind that of a probability: how many samples it strikes, how many of these are left
+FOR_NOISE, FOR_JITTER, FOR_STUCK, FOR_LAG, FOR_HOLD, FOR_DROPOUT = 0, 2, 4, 6, 8, 10
+"""Streams of random numbers, two each: for the two uniforms that make two normals, else for the two channels."""
 
+KEY, COUNT = 0, 1
+"""Rows: the key of the episode, and how many samples it has had."""
 # fmt: off
-(KEY, COUNT, SCALE, BIAS, DEAD_ZONE, DEAD_WIDTH, OUTSIDE, STUCK, STUCK_AT, NOISE, SPEED_NOISE, RESOLUTION, UPDATE, HELD,
- DELAY, LEAST, HOLD, LAG, TO, FROM, DROPOUT, JITTER, CUT, DRAWN, REGISTER) = offsets(
-    1, 1, 2, 2, 2, 2, 2, 6, 2, 2, 2, 2, 2, 2,
-    2, 2, 2, 2, 2, 2, 6, 1, 1, 2)
+(SCALE, BIAS, DEAD_ZONE, DEAD_WIDTH, STUCK, NOISE, SPEED_NOISE, RESOLUTION, UPDATE, DELAY, LEAST, HOLD, DROPOUT, JITTER,
+ CUT, OUTSIDE, STUCK_AT, HELD, LAG, TO, FROM, DRAWN, REGISTER) = (2 + row for row in offsets(
+     2, 2, 2, 2, 6, 2, 2, 2, 2, 2, 2, 2, 6, 1,
+     1, 2, 2, 2, 2, 2, 2, 2))
 # fmt: on
-"""Rows: the episode's key and how many samples it has had; settings, each channel's, in physical units and numbers of
-samples, and behind them what is remembered: the last reading outside of the dead zone, the one that is stuck, the one
-that is held until the next update, the delay that was drawn; and the readings of the last samples, newest first."""
+"""Rows of settings as in Sensor, of each channel, times in numbers of samples and 0 for off; behind the probability of
+a fault how many samples it lasts and how many of them are left. Then what is remembered: the reading before the dead
+zone, the one that is stuck, the one held until the next update, and the delay. Then scratch: places in the register,
+two uniforms. Last the register of earlier readings, of h and of theta, whose length depends on the delays."""
+_SAMPLES, _LEFT = 2, 4  # rows behind the one of a probability
+TURN = 6.283185307179586
 
 
 @inlined
@@ -54,7 +57,7 @@ def _draw_two(own: Array, lanes: int, stream: int) -> None:
 @inlined
 def _jitter(signals: Array, own: Array, lanes: int) -> None:
     deviation, cut = own[JITTER * LANES], own[CUT * LANES]
-    _draw_two(own, lanes, _JITTER)
+    _draw_two(own, lanes, FOR_JITTER)
     for i in range(lanes):
         normal, _ = two_normals(*two(own, DRAWN, i))
         put(signals, STAMP, i, min(max(deviation * normal, -cut), cut))
@@ -88,7 +91,7 @@ def _stick(signals: Array, own: Array, lanes: int, c: int) -> None:
     chance, samples = own[(STUCK + c) * LANES], own[(STUCK + c + _SAMPLES) * LANES]
     for i in range(lanes):
         last, y = at(own, STUCK_AT + c, i), at(signals, Y + c, i)
-        y = last if _struck(own, STUCK + c, chance, samples, _STUCK + c, i) else y
+        y = last if _struck(own, STUCK + c, chance, samples, FOR_STUCK + c, i) else y
         put(own, STUCK_AT + c, i, y)
         put(signals, Y + c, i, y)
 
@@ -96,7 +99,7 @@ def _stick(signals: Array, own: Array, lanes: int, c: int) -> None:
 @inlined
 def _add_noise(signals: Array, own: Array, lanes: int) -> None:
     fixed, growing = two(own, NOISE, 0), two(own, SPEED_NOISE, 0)
-    _draw_two(own, lanes, _NOISE)
+    _draw_two(own, lanes, FOR_NOISE)
     for i in range(lanes):
         a, b = two_normals(*two(own, DRAWN, i))
         y, (_, _, v, omega) = two(signals, Y, i), four(signals, X, i)
@@ -129,7 +132,7 @@ def _draw_lag(own: Array, lanes: int, c: int) -> None:
     choices = own[(DELAY + c) * LANES] - least + 1.0
     for i in range(lanes):
         lag, count = at(own, LAG + c, i), at(own, COUNT, i)
-        drawn, kept = _drawn(own, _LAG + c, i), _drawn(own, _HOLD + c, i) < hold
+        drawn, kept = _drawn(own, FOR_LAG + c, i), _drawn(own, FOR_HOLD + c, i) < hold
         put(own, LAG + c, i, lag if (count > 0.0) & kept else least + rounded(choices * drawn - 0.5))
 
 
@@ -160,7 +163,7 @@ def _lose(signals: Array, own: Array, lanes: int, c: int) -> None:
     chance, samples = own[(DROPOUT + c) * LANES], own[(DROPOUT + c + _SAMPLES) * LANES]
     for i in range(lanes):
         last, y = at(signals, Y0 + c, i), at(signals, Y + c, i)
-        put(signals, Y + c, i, last if _struck(own, DROPOUT + c, chance, samples, _DROPOUT + c, i) else y)
+        put(signals, Y + c, i, last if _struck(own, DROPOUT + c, chance, samples, FOR_DROPOUT + c, i) else y)
 
 
 @inlined
