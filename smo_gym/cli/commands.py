@@ -19,6 +19,7 @@ COMMANDS = {
     "consistency": "the article's averages and reductions against its own cells",
     "identify": "recover what the article does not print",
     "reference": "the minimum-energy reference of the tracking scenario",
+    "presets": "sensors, actuators, friction and disturbances by name, with sources",
     "watch": "a run of any controller, in a window or as a GIF, WebP or MP4",
     "animate": "a run of LQR or SMC as a GIF or WebP",
 }

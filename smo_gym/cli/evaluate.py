@@ -28,7 +28,7 @@ from ..evaluation.report import answer, figures, page, tables
 from ..evaluation.statistics import Result, results
 from ..policies import named
 from ..validation import choice, unknown
-from . import computing
+from . import computing, presets
 from .answer import show
 from .arguments import Parser, fraction, one_of, positive, several, versions
 from .entry import Stop, command, said, typed
@@ -94,12 +94,27 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         metavar="N",
         help="limit in newtons in place of the scenario's, for all controllers",
     )
+    for name, known in presets.KINDS.items():
+        names = ", ".join(known)
+        add(f"--{name}", type=setting, metavar="NAME", help=f"of the plants: {names}, or fields as YAML")
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     add("--verbose", action="store_true", help="print every cell of every table too, as in tables.md")
     parser.out("results", "folder for the results")
     computing.add(parser)
     return parser.parse_args(arguments)
+
+
+def setting(text: str) -> Any:
+    """An option's value: a name, or YAML.
+
+    Raises:
+        ValueError: it is no YAML.
+    """
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(f"{text!r} is neither a name nor YAML: {error}") from None
 
 
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
@@ -114,7 +129,15 @@ def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
         changes["uncertainty"] = tuple(dict.fromkeys(arguments.uncertainty))
     if arguments.force_limit is not None:
         changes["force_limit"] = arguments.force_limit
-    return [place.changed(note="command line", **changes) for place in found]
+    between = {name: value for name in presets.KINDS if (value := getattr(arguments, name)) is not None}
+    if between:
+        given = {name: {"value": value, "source": "chosen", "note": "command line"} for name, value in between.items()}
+        found = [place.changed(options={**place.options, **given}) for place in found]
+    changed = [place.changed(note="command line", **changes) for place in found]
+    if between:
+        for place in changed:
+            place.make()  # notices a value that is not allowed
+    return changed
 
 
 def chosen(

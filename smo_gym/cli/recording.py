@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..controllers import Agent, title
+from ..envs.task import Task
+from ..evaluation.drivers import unit_of
 from ..typing import Array
 from ..validation import choice
 
@@ -49,7 +51,8 @@ def run(
     Raises:
         ValueError: the agent raises an error, which is the cause of this one, or its force is not finite.
     """
-    dt = env.unwrapped.task.control_period  # type: ignore[attr-defined]
+    task: Task = env.unwrapped.task  # type: ignore[attr-defined]
+    dt = task.control_period
     observation, info = env.reset(seed=seed, options=options)
     memory, failed = None, False
     yield Instant(0.0, info["state"], observation[-4:], failed)
@@ -59,7 +62,7 @@ def run(
         except Exception as error:  # whatever a user's agent may raise
             place = f"t = {(k - 1) * dt:g} s"
             raise ValueError(f"{title(agent)}: cannot act at {place} ({type(error).__name__}: {error})") from error
-        observation, _, failed, _, info = env.step(np.asarray(action)[0])
+        observation, _, failed, _, info = env.step(np.asarray(action)[0] / unit_of(agent, task))
         yield Instant(k * dt, info["state"], observation[-4:], failed)
         if failed:
             return

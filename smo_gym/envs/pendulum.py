@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import gymnasium
@@ -12,16 +13,16 @@ from gymnasium import logger
 from gymnasium.error import ResetNeeded
 
 from ..loop import Part
-from ..plant import PARAMS
 from ..typing import Array
 from ..validation import mapping, short
 from .desired import Desired
+from .hearing import Heard, Hearing
 from .rendering import MODES, Renderer, Scene
 from .spec import Specified
-from .stepping import loop_of
+from .stepping import begin, loop_of
 from .task import HANGING, TRACKING, UPRIGHT, Task
 
-RESET_OPTIONS = ("state", "params")
+RESET_OPTIONS = ("state", "params", "noise")
 _ALL = slice(None)
 
 
@@ -75,10 +76,13 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
 
     ## Information
 
-    At every step, with the same keys: `state` (4,) and `params` [M_c, m, l, g] (4,), the truth; `force`, what the
-    actuator applied; `samples` (substeps, 2), what the encoders measured at each sampling instant of the control
-    period just run, and `positions` (substeps, 2), the truth then; with a reference also `desired` (substeps, 2),
-    where h and theta should have been.
+    At every step, with the same keys: `state` (4,) and `params` [M_c, m, l, g] (4,), the truth; `asked`, the force in N
+    that was asked for, within the limit, and `force`, what reached the cart of it, the mean over the control period;
+    `samples` (substeps, 2), what the sensors measured at each sampling instant of the control period just run, and
+    `positions` (substeps, 2), the truth then; with a reference also `desired` (substeps, 2), where h and theta should
+    have been. Where there is friction, `friction` (3,); with a disturbance, `pushes` (substeps, 2), its force in N and
+    torque in N m; with jitter, `stamps` (substeps,), how much later in s a sample was taken than it should; with a
+    force that is measured, `forces` (substeps,).
 
     ## Arguments
 
@@ -96,9 +100,16 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
     | `reward` | see above | weights: a mapping with `q`, `r`, `failure` |
     | `reference` | None | a trajectory to follow, :class:`smo_gym.Reference`; None asks for rest at zero |
     | `preview` | 5 | number of future control instants whose x_d a tracking observation tells |
+    | `sensor` | exact | :class:`~smo_gym.sensors.Sensor`, a mapping of its fields or a preset's name |
+    | `actuator` | ideal | :class:`~smo_gym.actuators.Actuator`, a mapping of its fields or a preset's name |
+    | `disturbance` | none | :class:`~smo_gym.disturbances.Disturbance`, a mapping, several of these, or a name |
+    | `friction` | of `params` | the true plants' :class:`~smo_gym.friction.Friction`, a mapping or a name |
+    | `friction_uncertainty` | 0 | x in [0, 1): each of its coefficients is scaled by U(1 - x, 1 + x) |
     | `render_mode` | None | `"human"`: a window; `"rgb_array"`: frames (400, 800, 3), no display needed |
 
-    `reset(options={"state": ..., "params": ...})` replays one exact case; what is not given is drawn.
+    `reset(options={"state": ..., "params": ..., "noise": ...})` replays one exact case; what is not given is drawn.
+    All else that is random in an episode (noise of the sensors, friction, disturbances) follows from the one whole
+    number `noise` in [0, 2^52).
 
     ## Rendering
 
@@ -127,7 +138,8 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         self.observation_space = self.task.observation_space
         self.action_space = self.task.action_space
         self.loop = loop_of(self.task, 1)
-        self._substeps, self._steps = self.task.substeps, self.task.steps
+        self._hearing = Hearing(self.task)
+        self._unit, self._steps = self.task.actuator.unit, self.task.steps
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._steps_left = 0
         self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
@@ -138,14 +150,14 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         """Draw a plant and an initial state, or take them from ``options``."""
         asked = self.task.asked(mapping("reset option", options or {}, RESET_OPTIONS))
         super().reset(seed=seed)
-        params, x = self.task.case(self.np_random, asked)
-        self.loop.start(_ALL, x[:, None])
-        self.loop.own("plant")[PARAMS : PARAMS + 4, 0] = params
-        self._params = params
+        case = replace(self.task.draw(self.np_random), **asked)
+        begin(self.loop, self.task, _ALL, [case])
+        if "observer" in self.loop.parts:
+            self.loop.restart("observer", _ALL)
+        self._params = case.params
         self._steps_left = self._steps
-        samples = np.repeat(x[None, :2], self._substeps, axis=0)
         self._see(0, 0.0)
-        return self._observation(0), self._info(samples, 0.0, 0)
+        return self._observation(0), self._info(self._hearing.still(self.loop), 0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Hold the force over one control period."""
@@ -162,18 +174,17 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
             raise ValueError(f"action={force} (slot 0) must be finite")
         self._steps_left -= 1
         k = self._steps - self._steps_left
-        loop, samples = self.loop, np.empty((self._substeps, 2, 1))
-        loop.u[0] = force
+        loop = self.loop
+        loop.u[0] = force * self._unit
         if self._desired is not None:
             loop.x_d[:, 0] = self._desired.states[k]
-        loop.run(positions=samples)
+        heard = self._hearing.drive(loop)
         terminated = loop.failed.item() > 0.0
         truncated = self._steps_left == 0 and not terminated
         if terminated:
             self._steps_left = 0
-        force = loop.u.item()
-        self._see(k, force)
-        info = self._info(samples[:, :, 0], force, k)
+        info = self._info(heard, k)
+        self._see(k, info["force"])
         return self._observation(k), loop.reward.item(), terminated, truncated, info
 
     def render(self) -> Any:
@@ -216,13 +227,15 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         y = self.loop.y[:, 0]
         return y.copy() if self._desired is None else np.concatenate([y, self._desired.told[k]])
 
-    def _info(self, samples: Array, force: float, k: int) -> dict[str, Any]:
+    def _info(self, heard: Heard, k: int) -> dict[str, Any]:
         info = {
             "state": self.loop.x[:, 0].copy(),
             "params": self._params.copy(),
-            "force": force,
-            "positions": samples,
-            "samples": samples.copy(),
+            "asked": heard.asked.item(),
+            "force": heard.force.item(),
+            "positions": heard.positions[..., 0],
+            "samples": heard.samples[..., 0],
+            **{name: values[..., 0] for name, values in heard.more.items()},
         }
         if self._desired is not None:
             info["desired"] = self._desired.positions[k].copy()

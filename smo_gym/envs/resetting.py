@@ -54,8 +54,12 @@ def seeds_of(seed: Any, n: int) -> list[int | None]:
 
 
 def slot_by_slot(options: dict[str, Any], n: int) -> list[dict[str, Any]]:
-    """Each slot's options, none where there are none: an array (n, 4) is taken apart, anything else is for all."""
+    """Each slot's options, none where there are none: an array (n, 4) is taken apart, anything else is for all.
+
+    So are n numbers of noise.
+    """
+    apart = {name: np.shape(value) == ((n,) if name == "noise" else (n, 4)) for name, value in options.items()}
     return [
-        {name: value[i] if np.shape(value) == (n, 4) else value for name, value in options.items()}
+        {name: value[i] if apart[name] else value for name, value in options.items()}
         for i in range(n if options else 0)
     ]

@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..actuators import limited
+from .. import disturbances, sensors
+from ..actuators import force_sensor, limited
+from ..friction import FRICTION, rubbing
 from ..kernels.blocks import ALIVE, FAILED, REWARD, XD, U, X, at, block, four, offsets, put
-from ..loop import Loop, Part, columns
-from ..plant import moving
-from ..sensors import exact
+from ..kernels.noise import uniforms
+from ..loop import Loop, Part, Slots, columns
+from ..plant import PARAMS, moving
 from ..typing import Array, Flags
 from ..validation import short
-from .task import Task
+from .task import Case, Task
 
+OF_FRICTION = (60, 61, 62)
+"""Streams of an episode's random numbers at its start that its friction is drawn from."""
 WEIGHTS, FORCE_WEIGHT, PENALTY, TRACK, ANGLE, _ = offsets(4, 1, 1, 1, 1)
 
 
@@ -45,16 +50,37 @@ def judged(task: Task, n: int) -> Part:
 def loop_of(task: Task, n: int) -> Loop:
     """The loop of n slots of a task, still without observer and law."""
     params = np.repeat(task.params.as_array()[:, None], n, axis=1)
-    return Loop(
-        n,
-        task.substeps,
-        {
-            "actuator": limited(n, task.force_limit),
-            "plant": moving(params, task.dt),
-            "sensor": exact(n),
-            "end": judged(task, n),
-        },
-    )
+    parts = {"sensor": task.sensor.part(n, task.dt), "end": judged(task, n)}
+    if task.ideal:
+        parts |= {"actuator": limited(n, task.force_limit), "plant": moving(params, task.dt)}
+    else:
+        friction = np.repeat(task.rubs.as_array()[:, None], n, axis=1)
+        parts |= {
+            "actuator": task.actuator.part(n, task.force_limit, task.dt),
+            "plant": rubbing(params, task.dt, friction, task.actuator.back_emf),
+        }
+    if task.disturbance:
+        parts["disturbance"] = disturbances.part(task.disturbance, n, task.dt)
+    if task.actuator.measured:
+        parts["force sensor"] = force_sensor(n)
+    return Loop(n, task.substeps, parts)
+
+
+def begin(loop: Loop, task: Task, slots: Slots, cases: Sequence[Case]) -> None:
+    """Begin an episode each in some slots; an observer is left alone."""
+    keys = np.array([case.key for case in cases])
+    for role in loop.parts.keys() & {"actuator", "disturbance", "force sensor", "sensor"}:
+        loop.restart(role, slots)
+    plant = loop.own("plant")
+    plant[PARAMS : PARAMS + 4, slots] = np.array([case.params for case in cases]).T
+    if not task.ideal:
+        scale = 1.0 + task.friction_uncertainty * (2.0 * uniforms(keys, OF_FRICTION) - 1.0)
+        plant[FRICTION : FRICTION + 3, slots] = task.rubs.as_array()[:, None] * scale
+    if task.sensor.random:
+        loop.own("sensor")[sensors.KEY, slots] = keys
+    if task.disturbance:
+        disturbances.begin(loop.own("disturbance"), slots, task.disturbance, keys)
+    loop.begin(slots, np.array([case.state for case in cases]).T)
 
 
 def checked_force(action: ArrayLike, n: int, ignored: Flags | None = None) -> Array:

@@ -11,12 +11,18 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from ..plant import CartPendulum
+from .. import presets
+from ..actuators import Actuator
+from ..disturbances import Disturbance
+from ..plant import CartPendulum, Friction
 from ..reference import Reference, shipped
+from ..sensors import Sensor
 from ..typing import Array
 from ..validation import array, limit, mapping, multiple, number, shape_of, unknown, whole
 
 _FURTHEST = 10_000  # control instants of a preview: an observation holds four numbers of each
+KEYS = 2**52
+"""How many sequences of random numbers there are: each episode's noise, disturbances and friction follow from one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,11 @@ class Task:
     reward: Reward = field(default_factory=Reward)
     reference: Reference | None = None
     preview: int = 5
+    sensor: Sensor = field(default_factory=Sensor)
+    actuator: Actuator = field(default_factory=Actuator)
+    disturbance: tuple[Disturbance, ...] = ()
+    friction: Friction | None = None
+    friction_uncertainty: float = 0.0
 
     @classmethod
     def of(cls, options: Mapping[str, Any], base: Task) -> Task:
@@ -97,9 +108,16 @@ class Task:
         multiple("horizon", self.horizon, "control_period", self.control_period)
         set_(self, "params", CartPendulum.of(self.params))
         set_(self, "reward", Reward.of(self.reward))
-        set_(self, "uncertainty", number("uncertainty", self.uncertainty))
-        if not 0.0 <= self.uncertainty < 1.0:
-            raise ValueError(f"uncertainty={self.uncertainty!r} must be a fraction in [0, 1)")
+        for name in ("uncertainty", "friction_uncertainty"):
+            set_(self, name, number(name, getattr(self, name)))
+            if not 0.0 <= getattr(self, name) < 1.0:
+                raise ValueError(f"{name}={getattr(self, name)!r} must be a fraction in [0, 1)")
+        set_(self, "sensor", presets.sensor(self.sensor))
+        set_(self, "actuator", presets.actuator(self.actuator))
+        set_(self, "disturbance", presets.disturbance(self.disturbance))
+        set_(self, "friction", presets.friction(self.friction))
+        for part in (self.sensor, self.actuator, *self.disturbance):
+            part.check(self.dt, self.horizon)
         if self.reference is not None and self.reference.params != tuple(self.params.as_array().tolist()):
             raise ValueError(
                 f"reference was computed for the plant {self.reference.params}, it must be for params={self.params}"
@@ -144,35 +162,68 @@ class Task:
 
     @property
     def action_space(self) -> spaces.Space[Array]:
-        """The force in N."""
-        return spaces.Box(-self.force_limit, self.force_limit, (1,), np.float64)
+        """The force in N, or the command in the actuator's unit."""
+        most = self.force_limit / self.actuator.unit
+        return spaces.Box(-most, most, (1,), np.float64)
 
-    def draw(self, rng: np.random.Generator) -> tuple[Array, Array]:
-        """An uncertain plant [M_c, m, l, g] and an initial state, each (4,), from an environment's own generator."""
+    @property
+    def rubs(self) -> Friction:
+        """The true plants' friction, before its uncertainty."""
+        return self.params.friction if self.friction is None else self.friction
+
+    @property
+    def ideal(self) -> bool:
+        """Whether the force that is asked for, and no other, moves a plant without friction."""
+        return self.actuator.ideal and not self.disturbance and self.rubs == Friction()
+
+    @property
+    def random(self) -> bool:
+        """Whether anything in an episode is random beside its plant and initial state."""
+        rubs = self.friction_uncertainty > 0.0 and self.rubs != Friction()
+        return rubs or self.sensor.random or any(each.random for each in self.disturbance)
+
+    def draw(self, rng: np.random.Generator) -> Case:
+        """An episode from an environment's own generator."""
         params = self.params.draw(self.uncertainty, rng).as_array()
         low, high = self.initial_state
-        return params, rng.uniform(low, high)
+        state = rng.uniform(low, high)
+        return Case(params, state, float(rng.integers(KEYS)) if self.random else 0.0)
 
-    def asked(self, options: Mapping[str, Any]) -> tuple[Array | None, Array | None]:
-        """The plant and initial state that reset options ask for; None for what is to be drawn.
+    def asked(self, options: Mapping[str, Any]) -> dict[str, Any]:
+        """The fields of a :class:`Case` that reset options ask for.
 
         Raises:
             ValueError: an option has a value that is not allowed.
         """
-        params, state = options.get("params"), options.get("state")
-        return (
-            None if params is None else CartPendulum.of(params, self.params).as_array(),
-            None if state is None else array("options['state']", state, (4,)),
-        )
-
-    def case(self, rng: np.random.Generator, asked: tuple[Array | None, Array | None]) -> tuple[Array, Array]:
-        """The plant and initial state of one episode: what is drawn, or what :meth:`asked` says instead."""
-        params, state = self.draw(rng)
-        return params if asked[0] is None else asked[0], state if asked[1] is None else asked[1]
+        found: dict[str, Any] = {}
+        if options.get("params") is not None:
+            found["params"] = CartPendulum.of(options["params"], self.params).as_array()
+        if options.get("state") is not None:
+            found["state"] = array("options['state']", options["state"], (4,))
+        if options.get("noise") is not None:
+            found["key"] = float(whole("options['noise']", options["noise"], 0))
+            if found["key"] >= KEYS:
+                raise ValueError(f"options['noise']={options['noise']!r} must be less than 2**52")
+        return found
 
     def as_options(self) -> dict[str, Any]:
         """The options that make this task, as plain data: what :meth:`of` takes and JSON holds."""
         return plain_data({f.name: getattr(self, f.name) for f in fields(self)})  # type: ignore[no-any-return]
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """What one episode draws.
+
+    Args:
+        params: the plant [M_c, m, l, g], (4,).
+        state: where it begins, (4,).
+        key: from which all noise, disturbances and friction of the episode follow, a whole number below :data:`KEYS`.
+    """
+
+    params: Array
+    state: Array
+    key: float
 
 
 HANGING = Task()

@@ -19,11 +19,12 @@ from ..plant import PARAMS
 from ..typing import Array, Flags
 from ..validation import mapping, short, whole
 from .desired import Desired
+from .hearing import Heard, Hearing
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .rendering import Renderer, Scene
 from .resetting import instants, marked, seeds_of, slot_by_slot
 from .spec import Specified
-from .stepping import checked_force, loop_of
+from .stepping import begin, checked_force, loop_of
 from .task import Task
 
 
@@ -77,6 +78,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.loop = loop_of(self.task, num_envs)
+        self._hearing = Hearing(self.task)
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
         self._force = np.zeros(num_envs)
@@ -112,7 +114,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         Args:
             seed: an integer s seeds slot i with s + i; a sequence gives each slot its own.
             options: ``state`` (4,) or (n, 4), ``params`` (4,), (n, 4) or a mapping, ``reset_mask`` (n,) of bool,
-                ``steps``, whole numbers () or (n,): the control periods after which this one episode is truncated,
+                ``noise``, whole numbers () or (n,), ``steps``, whole numbers () or (n,): the control periods after which this one episode is truncated,
                 at most those of the horizon, so that slots need not end together. Later episodes have the horizon.
         """
         options = mapping("reset option", options or {}, (*RESET_OPTIONS, "reset_mask", "steps"))
@@ -124,40 +126,39 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self._seed(seed, mask)
         self._start(mask, asked)
         self._cut[mask] = cut[mask]
-        return self._observation(), self._info(self._still(), np.zeros(self.num_envs))
+        return self._observation(), self._info(self._hearing.still(self.loop))
 
     def step(self, actions: Array) -> tuple[Array, Array, Flags, Flags, dict[str, Any]]:  # type: ignore[override]
         """Hold one force a slot over one control period."""
         if not self._generators:
             raise ResetNeeded("no episode has begun: call reset() before step()")
-        loop, samples, over = self.loop, np.empty((self.loop.substeps, 2, self.num_envs)), None
+        loop, over = self.loop, None
         if self._waiting:
             over = self._terminated | self._truncated
             loop.alive[over] = 0.0
-        loop.u[:] = checked_force(actions, self.num_envs, over)
+        loop.u[:] = checked_force(actions, self.num_envs, over) * self.task.actuator.unit
         self._k += 1 if over is None else ~over
         if self._desired is not None:
             loop.x_d[:] = self._desired.states[self._k].T
-        loop.run(positions=samples)
+        heard = self._hearing.drive(loop)
         reward, terminated = loop.reward.copy(), loop.failed > 0.0
         truncated = (self._k == self._cut) & ~terminated
-        force = loop.u.copy()
         if over is not None:
             if self.autoreset_mode is AutoresetMode.DISABLED:
                 terminated[over], truncated[over] = self._terminated[over], self._truncated[over]
             else:  # the step after the end is the reset (NEXT_STEP)
                 terminated[over] = truncated[over] = False
                 self._start(over, [])
-                samples[:, :, over] = loop.x[:2, over]
+            heard = heard.held(loop, over)
         self._terminated, self._truncated = terminated.copy(), truncated.copy()
-        info = self._info(samples, force)
+        info = self._info(heard)
         ended = terminated | truncated
         self._waiting = bool(np.count_nonzero(ended))
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._waiting:
-            info = self._restart(ended, info)
+            info = self._restart(ended, heard, info)
         return self._observation(), reward, terminated, truncated, info
 
-    def _restart(self, ended: Flags, final: dict[str, Any]) -> dict[str, Any]:
+    def _restart(self, ended: Flags, heard: Heard, final: dict[str, Any]) -> dict[str, Any]:
         """Start ended slots in the step that ended them (SAME_STEP): the last they gave goes to ``final_*``."""
         observation = self._observation()
         final_obs = np.full(self.num_envs, None, dtype=object)
@@ -165,11 +166,8 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
             final_obs[i] = observation[i].copy()
         final_info = {key: only(value, ended) for key, value in final.items()}
         self._start(ended, [])
-        samples, force = final["samples"].copy(), final["force"].copy()
-        samples[ended] = self.loop.x[:2, ended].T[:, None]
-        force[ended] = 0.0
         return {
-            **self._info(samples.transpose(1, 2, 0), force),
+            **self._info(heard.held(self.loop, ended)),
             "final_obs": final_obs,
             "_final_obs": ended.copy(),
             "final_info": final_info,
@@ -222,20 +220,14 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         pairs = [new or old for new, old in zip(drawn, kept, strict=True)]
         self._generators, self._seeds = [pair[0] for pair in pairs if pair], [pair[1] for pair in pairs if pair]
 
-    def _start(self, mask: Flags, asked: Sequence[tuple[Array | None, Array | None]]) -> None:
+    def _start(self, mask: Flags, asked: Sequence[dict[str, Any]]) -> None:
         slots = np.flatnonzero(mask)
-        cases = [self.task.case(self._generators[i], asked[i] if asked else (None, None)) for i in slots.tolist()]
-        params = self.loop.own("plant")[PARAMS : PARAMS + 4]
-        params[:, slots] = np.array([case[0] for case in cases]).T
-        self.loop.begin(slots, np.array([case[1] for case in cases]).T)
-        self._params_told = params.T.copy()
+        cases = [replace(self.task.draw(self._generators[i]), **(asked[i] if asked else {})) for i in slots.tolist()]
+        begin(self.loop, self.task, slots, cases)
+        self._params_told = self.loop.own("plant")[PARAMS : PARAMS + 4].T.copy()
         self._params_told.flags.writeable = False  # infos share it
         self._k[mask], self._cut[mask] = 0, self.task.steps
         self._terminated[mask] = self._truncated[mask] = False
-
-    def _still(self) -> Array:
-        """Samples (substeps, 2, n) of plants that have not moved."""
-        return np.repeat(self.loop.x[None, :2], self.loop.substeps, axis=0)
 
     def _observation(self) -> Array:
         if self._desired is None:
@@ -246,24 +238,22 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         observation[:, 2:] = told
         return observation
 
-    def _info(self, samples: Array, force: Array) -> dict[str, Any]:
-        self._force = force
-        everywhere, told = self._everywhere, samples.transpose(2, 0, 1)
+    def _info(self, heard: Heard) -> dict[str, Any]:
+        self._force = heard.force
         info = {
             "state": self.loop.x.T.copy(),
-            "_state": everywhere,
             "params": self._params_told,
-            "_params": everywhere,
-            "force": force,
-            "_force": everywhere,
-            "positions": told,
-            "_positions": everywhere,
-            "samples": samples.copy().transpose(2, 0, 1),
-            "_samples": everywhere,
+            "asked": heard.asked,
+            "force": self._force,
+            "positions": heard.positions.transpose(2, 0, 1),
+            "samples": heard.samples.transpose(2, 0, 1),
+            **{name: np.moveaxis(values, -1, 0) for name, values in heard.more.items()},
         }
         if self._desired is not None:
-            info |= {"desired": self._desired.positions[self._k], "_desired": everywhere}
-        return info
+            info["desired"] = self._desired.positions[self._k]
+        return {
+            key: value for name, told in info.items() for key, value in ((name, told), (f"_{name}", self._everywhere))
+        }
 
 
 def only(values: NDArray[Any], slots: Flags) -> NDArray[Any]:

@@ -14,7 +14,7 @@ from ..envs.desired import Desired
 from ..envs.task import Task
 from ..envs.vector import PendulumVectorEnv
 from ..kernels.blocks import X, Y, block, put_two, two
-from ..loop import Loop, Part
+from ..loop import Loop, Part, runs_as_part
 from ..typing import Array
 from ..wrappers import VectorObserverWrapper
 from ..wrappers.inside import as_they_are
@@ -66,6 +66,11 @@ def driven(env: PendulumVectorEnv, law: Any, parts: Mapping[str, Part], watch: W
     return loop
 
 
+def unit_of(agent: Agent, task: Task) -> float:
+    """What an agent's forces are divided by to be actions of the environment: a law that runs in a loop says newtons."""
+    return task.actuator.unit if runs_as_part(agent, "predict") else 1.0
+
+
 @block
 def _follow(signals: Array, own: Array, lanes: int) -> None:
     for i in range(lanes):
@@ -95,9 +100,10 @@ def asked(
         return observation[:, -4:].T if observed else np.full((4, n), np.nan)
 
     loop.start(_EVERY, info["state"].T)
-    loop.xhat[:] = estimate()
+    loop.xhat[:], loop.y[:] = estimate(), observation[:, :2].T
     watch.look(0, loop)
     failed = np.zeros(n, dtype=np.bool_)
+    unit = unit_of(agent, task)
     first, agent_state = np.ones(n, dtype=np.bool_), None
     later = ~first
     failures = 0
@@ -109,17 +115,18 @@ def asked(
         except Exception as error:  # whatever a user's agent may raise
             place = f"t = {(k - 1) * task.control_period:g} s"
             raise ValueError(f"{title(agent)}: cannot act at {place} ({type(error).__name__}: {error})") from error
-        first = later
+        action, first = action / unit, later
         if failures:
             action = np.where(failed[:, None], 0.0, action)
         observation, loop.reward[:], ended, _, info = env.step(action)
         loop.alive[:] = ~failed
         loop.x[:] = info["state"].T
         loop.xhat[:] = np.where(failed, loop.xhat, estimate()) if failures else estimate()
-        loop.u[:] = info["force"]
+        loop.u[:] = info["asked"]
         if "desired" in info:
             reference[1:, :2] = info["desired"][np.argmin(failed)]  # of a slot whose time goes on
         loop.run(0, 1, reference, recording=np.ascontiguousarray(info["positions"].transpose(1, 2, 0)))
+        loop.y[:] = observation[:, :2].T
         lost = diverged(observation) | info.get("estimate_failed", False)
         if hold is not None and np.count_nonzero(lost):
             hold(lost)

@@ -20,6 +20,7 @@ from ..plant import STATE_NAMES
 from ..typing import Array, Flags
 from ..wrappers import VectorObserverWrapper
 from .arms import arm
+from .draws import deviations, noise
 from .pieces import Keeper, Map, cut
 from .rollout import rollout
 from .scenario import ControllerSettings, Scenario
@@ -113,14 +114,6 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
             "fewer runs, levels or initial states, or a shorter horizon"
         )
     return found
-
-
-def deviations(seed: int, runs: int) -> Array:
-    """What multiplies the level of uncertainty in M_c, m and l, U(-1, 1), (runs, 3).
-
-    Run r's draw depends on the seed and r alone, so more runs add to those that were there.
-    """
-    return np.array([np.random.default_rng([seed, run]).uniform(-1.0, 1.0, 3) for run in range(runs)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +253,7 @@ def _run(
     task: Task = env.unwrapped.task  # type: ignore[attr-defined]
     nominal = task.params
     draws = deviations(seed, max(group.runs for group in batch))
+    keys = noise(seed, len(draws)) if task.random else []
     states, plants, observers = [], [], []
     for group in batch:
         observer: Any = arm(group.arm).observer(group.settings.observer, group.scenario, task)
@@ -271,10 +265,11 @@ def _run(
     edges = np.cumsum([group.runs for group in batch])[:-1]
     slots = [part[:TRACED_RUNS] for part in np.split(np.arange(n), edges)]
     params = np.array(plants)
+    noises = {"noise": np.concatenate([keys[: group.runs] for group in batch])} if keys else {}
     result = rollout(
         observed,
         agent,
-        options={"state": np.array(states), "params": params},
+        options={"state": np.array(states), "params": params, **noises},
         trace_every=None if samples is None else max(task.steps // samples, 1),
         trace_slots=np.concatenate(slots).tolist(),
         progress=lambda steps: progress(steps * dt * n),
@@ -292,9 +287,10 @@ def _split(traces: Traces | None, sizes: Sequence[int]) -> Sequence[Traces | Non
     """Traces of all slots as one a group."""
     if traces is None:
         return [None] * len(sizes)
-    of_slots = (traces.x, traces.xhat, traces.u, traces.u_low, traces.u_high, traces.u_mean)
-    parts = (np.split(values, np.cumsum(sizes)[:-1], axis=-1) for values in of_slots)
-    return [
-        Traces(traces.time, x, xhat, u, low, high, mean, traces.x_d)
-        for x, xhat, u, low, high, mean in zip(*parts, strict=True)
-    ]
+    whole: dict[str, Any] = {field.name: getattr(traces, field.name) for field in fields(Traces)}
+    apart = {
+        name: np.split(values, np.cumsum(sizes)[:-1], axis=-1)
+        for name, values in whole.items()
+        if values is not None and name not in ("time", "x_d")
+    }
+    return [Traces(**{**whole, **{name: parts[i] for name, parts in apart.items()}}) for i in range(len(sizes))]

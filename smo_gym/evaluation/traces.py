@@ -68,6 +68,8 @@ class Traces:
     """The mean force in N since the instant before, (m, n): what a force that chatters does to the cart."""
     x_d: Array | None
     """The reference x_d in m, rad, m/s, rad/s, (m, 4); None where there is none."""
+    y: Array | None = None
+    """What was measured, [h, theta] in m and rad, (m, 2, n); None where the sensors are exact."""
 
 
 LOW, HIGH, SUM, COUNT, _ = offsets(1, 1, 1, 1)
@@ -112,11 +114,13 @@ class Tracer:
             low, high = np.where(short, np.minimum(low, 0.0), low), np.where(short, np.maximum(high, 0.0), high)
             mean = total / self.every
         loop.restart("forces", slice(None))
-        self._rows.append((time, loop.x[:, mine].copy(), loop.xhat[:, mine].copy(), u, low, high, mean))
+        self._rows.append(
+            (time, loop.x[:, mine].copy(), loop.xhat[:, mine].copy(), u, low, high, mean, loop.y[:, mine].copy())
+        )
 
     def traces(self) -> Traces:
         """All that was kept, instant by instant."""
-        time, x, xhat, u, low, high, mean = (np.array(column) for column in zip(*self._rows, strict=True))
+        time, x, xhat, u, low, high, mean, y = (np.array(column) for column in zip(*self._rows, strict=True))
         reference = self._task.reference
         told = None if reference is None else Desired(self._task, reference).states[:: self.every][: len(time)]
-        return Traces(time, x, xhat, u, low, high, mean, told)
+        return Traces(time, x, xhat, u, low, high, mean, told, None if self._task.sensor.exact else y)

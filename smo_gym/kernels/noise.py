@@ -6,12 +6,15 @@ the same in every batch, on every thread, and however an episode is cut into cal
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 
-from . import inlined, instruction, interpreted
+from ..typing import Array
+from . import inlined, instruction, interpreted, kernel
 from .elementary import log, sincos
 from .interpreted import GOLDEN, MIX_1, MIX_2, ONE
 
@@ -66,3 +69,17 @@ def two_normals(a: float, b: float) -> tuple[float, float]:
     radius = math.sqrt(-2.0 * log(1.0 - a))
     sin, cos = sincos(_TWO_PI * b)
     return radius * cos, radius * sin
+
+
+@kernel
+def _uniforms(keys: Array, indices: Array, found: Array) -> None:
+    for j in range(len(indices)):
+        for i in range(len(keys)):
+            found[j, i] = uniform(keys[i], indices[j])
+
+
+def uniforms(keys: Array, indices: Sequence[float]) -> Array:
+    """The numbers of some episodes at some indices, (indices, keys)."""
+    found = np.empty((len(indices), len(keys)))
+    _uniforms(np.ascontiguousarray(keys, dtype=np.float64), np.array(indices, dtype=np.float64), found)
+    return found

@@ -61,8 +61,8 @@ def named(observer: Any, compensation: bool | None, settings: dict[str, Any]) ->
 
 UNSEEN = (
     "an observer reads what the encoders measured, info['samples'], and would not see this. Noise, quantisation or "
-    "delay of a sensor belongs into a wrapper inside that changes info['samples'] and the observation alike; a change "
-    "that is meant for the agent alone belongs outside the observer"
+    "delay of a sensor are the environment's option 'sensor', or of a wrapper inside that changes info['samples'] and "
+    "the observation alike; a change that is meant for the agent alone belongs outside the observer"
 )
 
 
@@ -106,6 +106,21 @@ def task_of(env: Any, batch: bool | None = None) -> Task:
 def unseen(observation: Array, y: Array) -> ValueError:
     """What there is to say where the observation is not what the encoders measured."""
     return ValueError(f"the environment observes {short(observation)} where {short(y)} was measured: {UNSEEN}")
+
+
+def bring(estimator: Estimator, samples: Array, told: Array) -> None:
+    """Bring estimates to the end of a control period.
+
+    Args:
+        estimator: of n slots.
+        samples: measured positions, (samples, 2, n).
+        told: the force in N, (n,), or where it is measured, too, that of each sampling period, (samples, n).
+    """
+    if told.ndim == 1:
+        estimator.update(samples, told)
+    else:
+        for k, u in enumerate(told):
+            estimator.update(samples[k : k + 1], np.ascontiguousarray(u))
 
 
 def lost_of(xhat: Array) -> Flags | None:

@@ -12,7 +12,7 @@ from gymnasium.utils import RecordConstructorArgs
 from ..envs.pendulum import PendulumEnv
 from ..observers import Observer
 from ..typing import Array
-from .inside import Plugged, at_work, make_observer, named, space_of, task_of, unseen
+from .inside import Plugged, at_work, bring, make_observer, named, space_of, task_of, unseen
 
 
 class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConstructorArgs):
@@ -86,7 +86,8 @@ class ObserverWrapper(gymnasium.Wrapper[Array, Array, Array, Array], RecordConst
                 self._show(told[2:])
                 return told, reward, terminated, truncated, info
         if not self._plugged:
-            self._estimator.update(info["samples"][:, :, None], np.array([info["force"]]))
+            told = info["forces"][:, None] if "forces" in info else np.array([info["asked"]])
+            bring(self._estimator, info["samples"][:, :, None], told)
             if self._see is not None:
                 self._see(self._every, info["state"][:, None])
         xhat = self._estimator.xhat[:, 0]

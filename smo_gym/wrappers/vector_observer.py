@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from ..envs.vector import PendulumVectorEnv, only
 from ..observers import Observer
 from ..typing import Array, Flags
-from .inside import Plugged, at_work, lost_of, make_observer, named, space_of, task_of, unseen
+from .inside import Plugged, at_work, bring, lost_of, make_observer, named, space_of, task_of, unseen
 
 
 class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], RecordConstructorArgs):
@@ -90,7 +90,8 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         restarted, any_restarted = (ended, any_ended) if same_step else (self._over, self._any_over)
         last = _at_the_end(info) if same_step and any_restarted else info
         if not self.plugged:
-            self._estimator.update(np.ascontiguousarray(last["samples"].transpose(1, 2, 0)), last["force"])
+            told = last["forces"].T if "forces" in last else last["asked"]
+            bring(self._estimator, np.ascontiguousarray(last["samples"].transpose(1, 2, 0)), told)
             if self._see is not None:
                 self._see(self._every, last["state"].T)
         xhat = self._estimator.xhat
@@ -133,7 +134,7 @@ def _at_the_end(info: dict[str, Any]) -> dict[str, Any]:
     """What slots that ended in this very step (SAME_STEP) gave last, beside what the others gave."""
     final = info["final_info"]
     merged = {}
-    for key in ("samples", "force", "state"):
+    for key in {"samples", "asked", "forces", "state"} & info.keys():
         merged[key] = info[key].copy()
         ended = final[f"_{key}"]
         merged[key][ended] = final[key][ended]

@@ -8,6 +8,7 @@ from conftest import SMALL
 import smo_gym
 from smo_gym import LQR, CartPendulum
 from smo_gym.evaluation import scenario, study
+from smo_gym.evaluation.draws import deviations
 
 K = [7.234, -4.132, 11.075, -1.025]
 
@@ -37,8 +38,8 @@ def test_a_study_is_what_single_runs_give(small):
 
 
 def test_more_runs_add_to_those_that_were_there():
-    assert (study.deviations(3, 20)[:5] == study.deviations(3, 5)).all()
-    assert (study.deviations(4, 5) != study.deviations(3, 5)).all()
+    assert (deviations(3, 20)[:5] == study.deviations(3, 5)).all()
+    assert (deviations(4, 5) != study.deviations(3, 5)).all()
 
 
 def test_a_scenario_of_the_upright_plant_is_upright(tmp_path):

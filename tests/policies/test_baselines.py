@@ -6,6 +6,7 @@ import pytest
 
 from smo_gym import CartPendulum, VectorObserverWrapper
 from smo_gym.evaluation import rollout, scenario, study
+from smo_gym.evaluation.draws import deviations
 from smo_gym.learning.measurement import measure
 from smo_gym.policies import BASELINES, shipped
 from smo_gym.wrappers.view import KINDS
@@ -27,7 +28,7 @@ def test_they_measure_what_their_cards_say(environment):
 
 def table_4(agent, observer, control_period):
     """Mean over Table 4's cells of MSE of h plus MSE of theta under 30 N, five plants a level."""
-    draws = study.deviations(0, 5)
+    draws = deviations(0, 5)
     plants = [CartPendulum().perturbed(x * draw).as_array() for x in TABLE_4.uncertainty.value for draw in draws]
     options = {"control_period": control_period, "force_limit": 30.0}
     env = gymnasium.make_vec("SMOPendulum-v0", len(plants), autoreset_mode="Disabled", **options)

@@ -21,10 +21,10 @@ from ...plant import CartPendulum
 from ...typing import Array
 from ...wrappers import VectorObserverWrapper
 from ..arms import PRINTED
+from ..draws import deviations as draws
 from ..rollout import rollout
 from ..scenario import Scenario
 from ..settings import LqrSettings, SmcSettings
-from ..study import deviations as draws
 from .search import Hypothesis
 
 STATES = ("h", "theta")

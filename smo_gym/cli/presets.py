@@ -1,0 +1,72 @@
+"""The sensors, actuators, friction and disturbances that have a name, with the source of their numbers.
+
+smo-gym presets                    # all
+smo-gym presets sensor cart-pole   # one, every field of it
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+from .. import presets
+from ..validation import choice
+from .arguments import Parser, one_of
+from .console import screen
+from .entry import command
+
+KINDS: dict[str, Mapping[str, presets.Preset[Any]]] = {
+    "sensor": presets.SENSORS,
+    "actuator": presets.ACTUATORS,
+    "friction": presets.FRICTIONS,
+    "disturbance": presets.DISTURBANCES,
+}
+
+
+@command("presets")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """List; 0, or 2 where there is nothing of a name."""
+    parser = Parser("presets", __doc__)
+    parser.add_argument(
+        "kind", nargs="?", type=one_of("kind", [*KINDS]), metavar="KIND", help=f"{', '.join(KINDS)}; all by default"
+    )
+    parser.add_argument("name", nargs="?", metavar="NAME", help="of a preset; all by default")
+    args = parser.parse_args(arguments)
+    if args.name is not None:
+        choice(args.kind, args.name, KINDS[args.kind])
+    _show({kind: known for kind, known in KINDS.items() if args.kind in (None, kind)}, args.name)
+    return 0
+
+
+def _show(kinds: Mapping[str, Mapping[str, presets.Preset[Any]]], name: str | None) -> None:
+    from rich.padding import Padding
+
+    console = screen()
+    for kind, known in kinds.items():
+        for preset_name, preset in known.items():
+            if name not in (None, preset_name):
+                continue
+            console.print(f"{kind}={preset_name!r}", style="bold")
+            told = said(preset.settings, whole=name is not None) or "as the default"
+            console.print(Padding(told, (0, 0, 0, 4)))
+            console.print(Padding(preset.source, (0, 0, 0, 4)), style="dim")
+    console.file.flush()
+
+
+def said(settings: Any, whole: bool = False) -> str:
+    """Settings by field: all, or those that are not the default."""
+    if isinstance(settings, tuple):
+        return "; ".join(said(each, whole) for each in settings)
+    assert is_dataclass(settings)
+    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    usual = type(settings)() if not whole else None
+    return ", ".join(
+        f"{field}={_short(value)}" for field, value in values.items() if whole or value != getattr(usual, field)
+    )
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_short, value))})"
+    return f"{value:.5g}" if isinstance(value, float) else repr(value)
