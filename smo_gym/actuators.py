@@ -110,7 +110,7 @@ def _lag(signals: Array, own: Array, lanes: int) -> None:
 
 
 @inlined
-def _rest(signals: Array, lanes: int) -> None:
+def _rest(signals: Array, own: Array, lanes: int) -> None:
     for i in range(lanes):
         force, alive = at(signals, FORCE, i), at(signals, ALIVE, i) > 0.0
         put(signals, FORCE, i, force if alive else 0.0)
@@ -125,7 +125,7 @@ def _reach(signals: Array, own: Array, lanes: int) -> None:
         _climb(signals, own, lanes)
     if own[MEAN * LANES] > 0.0:
         _lag(signals, own, lanes)
-    _rest(signals, lanes)
+    _rest(signals, own, lanes)
 
 
 @block
