@@ -9,16 +9,21 @@ from typing import Any
 
 import numpy as np
 
+from .kernels import inlined
 from .kernels.batch import LANES
 from .kernels.blocks import ALIVE, FAILED, FORCE, U, at, block, offsets, put
 from .kernels.elementary import rounded
 from .loop import Part, columns
 from .typing import Array
-from .validation import mapping, number, switch, whole
+from .validation import mapping, number, short, switch, whole
 
-LIMIT, REFUSED, ASKED, TARGET, RATE, LAG, GAINS, SETTINGS, DELAYED = offsets(1, 1, 1, 1, 1, 1, 2, 4)
-_RESOLUTION, _ZONE, _RATE_LIMIT, _DELAY = (SETTINGS + k for k in range(4))
-"""Own rows; behind them the forces that are on their way, the newest first."""
+LIMIT, REFUSED, ASKED, COMMAND, PLACE, RAMP, LAG, SETTINGS, REGISTER = offsets(1, 1, 1, 1, 1, 1, 1, 6)
+RESOLUTION, DELAY, DEAD_ZONE, STEP, KEPT, MEAN = range(SETTINGS, REGISTER)
+"""Own rows: the force that is asked for and the one of the converter; where in the register the oldest force on its way
+is, behind which the next comes; what rate limit and lag have come to. Then what is alike in all slots: STEP is how far
+the force may go in a sampling period; of its distance from its input the lag has KEPT at the end of one, and MEAN on
+average over it. Last the register: the forces on their way."""
+_FINEST = 1e-12  # of a resolution: finer ones are lost in the rounding of float64
 
 
 @block
@@ -41,8 +46,8 @@ def limited(n: int, limit: float) -> Part:
 
 
 @block
-def _asked(signals: Array, own: Array, lanes: int) -> None:
-    resolution = own[_RESOLUTION * LANES]
+def _ask(signals: Array, own: Array, lanes: int) -> None:
+    resolution = own[RESOLUTION * LANES]
     for i in range(lanes):
         wanted, limit, alive = at(signals, U, i), at(own, LIMIT, i), at(signals, ALIVE, i) > 0.0
         fine = math.isfinite(wanted)
@@ -50,36 +55,77 @@ def _asked(signals: Array, own: Array, lanes: int) -> None:
         force = force if fine and alive else 0.0
         put(signals, U, i, force)
         put(own, ASKED, i, force)
-        put(own, TARGET, i, force)
+        put(own, COMMAND, i, force)
         put(signals, FAILED, i, 1.0 if alive and not fine else at(signals, FAILED, i))
         put(own, REFUSED, i, wanted if alive and not fine else at(own, REFUSED, i))
     if resolution > 0.0:
         for i in range(lanes):
-            put(own, TARGET, i, resolution * rounded(at(own, TARGET, i) / resolution))
+            put(own, COMMAND, i, resolution * rounded(at(own, COMMAND, i) / resolution))
+
+
+@inlined
+def _within(x: float, low: float, high: float) -> float:
+    x = low if x < low else x
+    return high if x > high else x
+
+
+@inlined
+def _skip_dead_zone(signals: Array, own: Array, lanes: int) -> None:
+    zone = own[DEAD_ZONE * LANES]
+    for i in range(lanes):
+        force = at(own, COMMAND, i)
+        put(signals, FORCE, i, force - _within(force, -zone, zone))
+
+
+@inlined
+def _wait(signals: Array, own: Array, lanes: int) -> None:
+    delay = own[DELAY * LANES]
+    for i in range(lanes):
+        oldest, force = REGISTER + int(at(own, PLACE, i)), at(signals, FORCE, i)
+        put(signals, FORCE, i, at(own, oldest, i))
+        put(own, oldest, i, force)
+    for i in range(lanes):
+        place = at(own, PLACE, i) + 1.0
+        put(own, PLACE, i, place if place < delay else 0.0)
+
+
+@inlined
+def _climb(signals: Array, own: Array, lanes: int) -> None:
+    step = own[STEP * LANES]
+    for i in range(lanes):
+        before = at(own, RAMP, i)
+        force = _within(at(signals, FORCE, i), before - step, before + step)
+        put(own, RAMP, i, force)
+        put(signals, FORCE, i, force)
+
+
+@inlined
+def _lag(signals: Array, own: Array, lanes: int) -> None:
+    kept, mean = own[KEPT * LANES], own[MEAN * LANES]
+    for i in range(lanes):
+        to = at(signals, FORCE, i)
+        behind = at(own, LAG, i) - to
+        put(own, LAG, i, to + kept * behind)
+        put(signals, FORCE, i, to + mean * behind)
+
+
+@inlined
+def _rest(signals: Array, own: Array, lanes: int) -> None:
+    for i in range(lanes):
+        force, alive = at(signals, FORCE, i), at(signals, ALIVE, i) > 0.0
+        put(signals, FORCE, i, force if alive else 0.0)
 
 
 @block
 def _reach(signals: Array, own: Array, lanes: int) -> None:
-    delay = int(own[_DELAY * LANES])
-    zone, rate = own[_ZONE * LANES], own[_RATE_LIMIT * LANES]
-    kept, mean = own[GAINS * LANES], own[(GAINS + 1) * LANES]
-    last = DELAYED + delay - 1 if delay > 0 else TARGET
-    for i in range(lanes):
-        # what moves out of the delay, less the dead zone
-        come = at(own, last, i)
-        come = math.copysign(max(abs(come) - zone, 0.0), come)
-        # no faster than the rate limit
-        before = at(own, RATE, i)
-        now = before + min(max(come - before, -rate), rate)
-        put(own, RATE, i, now)
-        # the exact lag over the step, and its mean
-        behind = at(own, LAG, i) - now
-        put(own, LAG, i, now + kept * behind)
-        put(signals, FORCE, i, now + mean * behind)
-    for k in range(delay):
-        to, of = DELAYED + delay - 1 - k, DELAYED + delay - 2 - k if k < delay - 1 else TARGET
-        for i in range(lanes):
-            put(own, to, i, at(own, of, i))
+    _skip_dead_zone(signals, own, lanes)  # it does not matter whether it comes before the delay
+    if own[DELAY * LANES] > 0.0:
+        _wait(signals, own, lanes)
+    if own[STEP * LANES] < math.inf:
+        _climb(signals, own, lanes)
+    if own[MEAN * LANES] > 0.0:
+        _lag(signals, own, lanes)
+    _rest(signals, own, lanes)
 
 
 @block
@@ -91,7 +137,8 @@ def _restore(signals: Array, own: Array, lanes: int) -> None:
 @block
 def _measure(signals: Array, own: Array, lanes: int) -> None:
     for i in range(lanes):
-        put(signals, U, i, at(signals, FORCE, i))
+        force, alive = at(signals, FORCE, i), at(signals, ALIVE, i) > 0.0
+        put(signals, U, i, force if alive else 0.0)
 
 
 def force_sensor(n: int) -> Part:
@@ -101,23 +148,32 @@ def force_sensor(n: int) -> Part:
 
 @dataclass(frozen=True, slots=True)
 class Actuator:
-    """What stands between the force that is asked for and the one that reaches the cart.
+    """What stands between the force that is asked for and the one that reaches the cart; by default nothing.
 
-    In this order: the environment's ``force_limit``; steps of ``resolution``; a delay of ``delay`` sampling periods; a
-    dead zone, u -> sgn(u) max(|u| - dead_zone, 0); a rate limit; a first-order lag T f' = u - f, exact for the held u,
-    of which the cart feels the mean over each integration step; and f - back_emf h', which stands in the plant's
-    right-hand side, since it depends on the cart's speed.
+    A force u, within the environment's ``force_limit``, is held over a control period and becomes in this order
+
+    ::
+
+        resolution      u = the nearest multiple of it
+        delay           u = the one of so many sampling periods ago    0 before the first
+        dead zone       u = sgn(u) max(|u| - dead_zone, 0)
+        rate limit      u = what is nearest to it within dt rate_limit of the one before, at each sampling instant
+        lag             time_constant f' = u - f                       exact for the held u
+        back-EMF        F = f - back_emf h'                            in the plant's equations of motion
+
+    f and F begin at 0. The row FORCE is F on average over a sampling period, to which the cart answers: with the lag f
+    goes from f_0 to ``u + (f_0 - u) e^-r``, r = dt / time_constant, and is ``u + (f_0 - u) (1 - e^-r) / r`` on average.
 
     Args:
-        unit: N per unit of command. Actions of the environment are in that unit, forces everywhere else in N.
-        resolution: of the command in N; None for none.
+        unit: N per unit of command. Actions of an environment are in that unit, forces everywhere else in N.
+        resolution: one step of the converter in N, None for none.
         delay: in whole sampling periods.
-        dead_zone: in N.
-        rate_limit: in N/s; None for none.
-        time_constant: T in s.
-        back_emf: in N s/m.
-        measured: whether observers are told the force that reaches the cart, as by a current or force sensor, and not
-            the one that was asked for.
+        dead_zone: in N, as of dry friction in a gear.
+        rate_limit: in N/s, None for none.
+        time_constant: in s, as of a motor's winding.
+        back_emf: in N per m/s of the cart.
+        measured: whether observers are told the force that reaches the cart, as by a force sensor, in place of the one
+            that is asked for. Metrics are of the one that is asked for.
 
     Raises:
         ValueError: a value is not allowed.
@@ -135,51 +191,64 @@ class Actuator:
     def __post_init__(self) -> None:
         set_ = object.__setattr__
         set_(self, "unit", number("actuator unit", self.unit, above=0.0))
-        for name in ("resolution", "rate_limit"):
-            if getattr(self, name) is not None:
-                set_(self, name, number(f"actuator {name}", getattr(self, name), above=0.0))
+        set_(self, "resolution", _or_none("actuator resolution", self.resolution, _FINEST))
+        set_(self, "delay", whole("actuator delay", self.delay, 0))
+        set_(self, "rate_limit", _or_none("actuator rate_limit", self.rate_limit, 0.0))
         for name in ("dead_zone", "time_constant", "back_emf"):
             set_(self, name, number(f"actuator {name}", getattr(self, name)))
             if getattr(self, name) < 0.0:
                 raise ValueError(f"actuator {name}={getattr(self, name)!r} must be at least 0")
-        set_(self, "delay", whole("actuator delay", self.delay, 0))
         set_(self, "measured", switch("actuator measured", self.measured))
 
     @classmethod
     def of(cls, actuator: Actuator | Mapping[str, Any] | None) -> Actuator:
-        """An actuator from itself, a mapping of field names or None for the ideal one.
+        """An actuator from an actuator, a mapping of field names or None for the ideal one.
 
         Raises:
             ValueError: an unknown field, or a value that is not allowed.
         """
         if isinstance(actuator, Actuator):
             return actuator
-        return cls(**mapping("actuator setting", actuator or {}, [field.name for field in fields(cls)]))
+        return cls(**mapping("actuator setting", {} if actuator is None else actuator, [f.name for f in fields(cls)]))
 
     @property
     def ideal(self) -> bool:
-        """Whether the force that is asked for, within the limit, reaches the cart as it is."""
+        """Whether the force that is asked for reaches the cart as it is, and nothing measures it."""
         return self == Actuator(unit=self.unit)
 
     def check(self, dt: float, horizon: float) -> None:
-        """See that the actuator can work at a sampling period in an episode, both in s.
+        """See that the actuator can serve episodes of ``horizon`` seconds which are sampled every ``dt`` seconds.
 
         Raises:
             ValueError: the delay is as long as the episode.
         """
         if self.delay * dt >= horizon:
             raise ValueError(
-                f"actuator delay={self.delay} sampling periods of {dt:g} s must be shorter than the episode of {horizon:g} s"
+                f"actuator delay={self.delay} samples of dt={dt!r} s must be less than the horizon={horizon!r} s"
             )
 
     def part(self, n: int, limit: float, dt: float) -> Part:
-        """What the actuator puts into a loop of n slots with a force limit in N and a sampling period in s."""
+        """What the actuator puts into a loop of n slots that is sampled every ``dt`` seconds.
+
+        Forces are limited and refused as by :func:`limited`. Where they are measured, the loop needs a
+        :func:`force_sensor`, too.
+        """
         kept, mean = 0.0, 0.0
         if self.time_constant > 0.0:
             ratio = dt / self.time_constant
             kept, mean = math.exp(-ratio), -math.expm1(-ratio) / ratio
-        rate = math.inf if self.rate_limit is None else self.rate_limit * dt
-        settings = (self.resolution or 0.0, self.dead_zone, rate, float(self.delay))
-        rows = columns(n, limit, np.zeros(LAG - LIMIT), (kept, mean), settings, np.zeros(self.delay))
-        close = _restore if self.measured else None
-        return Part(rows, act=_asked, sample=_reach, close=close, alike=(kept, mean, *settings))
+        step = math.inf if self.rate_limit is None else self.rate_limit * dt
+        settings = (self.resolution or 0.0, float(self.delay), self.dead_zone, step, kept, mean)
+        rows = columns(n, limit, np.zeros(SETTINGS - REFUSED), settings, np.zeros(self.delay))
+        return Part(rows, act=_ask, sample=_reach, close=_restore if self.measured else None, alike=settings)
+
+
+def _or_none(name: str, value: Any, least: float) -> float | None:
+    """A positive number of at least ``least``, or None."""
+    if value is None:
+        return None
+    found = number(name, value)
+    if found < least or found <= 0.0:
+        allowed = f"at least {least:g}" if least > 0.0 else "greater than 0"
+        raise ValueError(f"{name}={short(value)} must be {allowed}, or None for none")
+    return found

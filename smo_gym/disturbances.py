@@ -2,127 +2,85 @@
 
 from __future__ import annotations
 
+import inspect
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from functools import cache
+from types import FunctionType
 from typing import Any
 
-import numba
 import numpy as np
+from numba import types
+from numba.core.errors import NumbaError
 
-from .kernels import COMPILES
-from .kernels.batch import LANES
-from .kernels.blocks import ALIVE, FAILED, PUSH, Block, X, at, block, four, offsets, put, put_two, two
-from .kernels.elementary import sincos
-from .kernels.noise import STREAMS, two_normals, uniform, uniforms
+from .kernels import COMPILES, plain, pushing
+from .kernels.noise import STREAMS, uniforms
+from .kernels.pushing import KINDS, Function
 from .loop import Part, Slots, columns
 from .typing import Array
-from .validation import choice, mapping, number, short
+from .validation import choice, mapping, number, shape_of, short
 
-KINDS = ("constant", "step", "sine", "pulses", "noise", "function")
+Drawn = float | tuple[float, float]
+
 DRAWN = ("force", "torque", "start", "frequency", "phase")
-Function = Callable[[float, float, float, float, float], tuple[float, float]]
-_STREAM, _DRAWS = 32, 48
-"""Streams of an episode's random numbers: two for each sample, and the draws, of disturbance k at sample k."""
-_TWO_PI = 2.0 * math.pi
-
-KEY, COUNT, DT, HOW_MANY, REFUSED, FIRST = offsets(1, 1, 1, 1, 1)
-SIZE, START, FREQUENCY, PHASE, WIDTH, KEPT, KIND, STATE, _GROUP = offsets(2, 1, 1, 1, 1, 1, 1, 2)
-"""Rows of the part, and behind them rows of each disturbance."""
-_SHAPES, _NOISE = ("constant", "step", "sine", "pulses"), float(KINDS.index("noise"))
-_SINE, _PULSES = float(KINDS.index("sine")), float(KINDS.index("pulses"))
-
-
-@block
-def _push(signals: Array, own: Array, lanes: int) -> None:
-    dt, many = own[DT * LANES], int(own[HOW_MANY * LANES])
-    for i in range(lanes):
-        put_two(signals, PUSH, i, (0.0, 0.0))
-    for d in range(many):
-        group = own[(FIRST + d * _GROUP) * LANES :]
-        kind = group[KIND * LANES]
-        if kind == _NOISE:
-            for i in range(lanes):
-                key, index = at(own, KEY, i), STREAMS * at(own, COUNT, i) + (_STREAM + 2 * d)
-                fresh = two_normals(uniform(key, index), uniform(key, index + 1.0))
-                kept, state = at(group, KEPT, i), two(group, STATE, i)
-                kept = 0.0 if at(own, COUNT, i) == 0.0 else kept  # as stationary at the start as ever
-                new = math.sqrt(1.0 - kept * kept)
-                put_two(group, STATE, i, (kept * state[0] + new * fresh[0], kept * state[1] + new * fresh[1]))
-        else:
-            for i in range(lanes):
-                since = (at(own, COUNT, i) + 0.5) * dt - at(group, START, i)
-                turns = since * at(group, FREQUENCY, i)
-                sine, _ = sincos(_TWO_PI * turns + at(group, PHASE, i))
-                pulse = 1.0 if (turns - math.floor(turns)) < at(group, WIDTH, i) * at(group, FREQUENCY, i) else 0.0
-                wave = sine if kind == _SINE else (pulse if kind == _PULSES else 1.0)
-                wave = wave if since >= 0.0 else 0.0
-                put_two(group, STATE, i, (wave, wave))
-        for i in range(lanes):
-            push, size, state = two(signals, PUSH, i), two(group, SIZE, i), two(group, STATE, i)
-            put_two(signals, PUSH, i, (push[0] + size[0] * state[0], push[1] + size[1] * state[1]))
-    for i in range(lanes):
-        put(own, COUNT, i, at(own, COUNT, i) + 1.0)
-
-
-@cache
-def _with(function: Function) -> Block:
-    """A block of :func:`_push` and a function."""
-    compiled = function
-    if COMPILES and not hasattr(function, "py_func"):
-        compiled = numba.njit(error_model="numpy")(function)
-
-    def push(signals: Array, own: Array, lanes: int) -> None:
-        _push(signals, own, lanes)
-        dt = own[DT * LANES]
-        for i in range(lanes):
-            h, theta, h_dot, theta_dot = four(signals, X, i)
-            t = (at(own, COUNT, i) - 0.5) * dt
-            force, torque = compiled(t, h, theta, h_dot, theta_dot)
-            before = two(signals, PUSH, i)
-            fine, alive = math.isfinite(force + torque), at(signals, ALIVE, i) > 0.0
-            put_two(signals, PUSH, i, (before[0] + (force if fine else 0.0), before[1] + (torque if fine else 0.0)))
-            put(signals, FAILED, i, 1.0 if alive and not fine else at(signals, FAILED, i))
-            put(own, REFUSED, i, t if alive and not fine and at(own, REFUSED, i) == 0.0 else at(own, REFUSED, i))
-
-    return numba.njit(error_model="numpy", nogil=True)(push) if COMPILES else push  # type: ignore[no-any-return]
+"""What may be a pair (low, high)."""
+_OF_KIND = {
+    "constant": ("force", "torque"),
+    "step": ("force", "torque", "start"),
+    "sine": ("force", "torque", "start", "frequency", "phase"),
+    "pulses": ("force", "torque", "start", "frequency", "width"),
+    "noise": ("force", "torque", "start", "bandwidth"),
+    "function": ("function",),
+}
+_DRAWS = 48
+"""Streams that sizes are drawn from begin here: those of the d-th disturbance at sample d."""
+_MOST = 8
+"""Disturbances at once: each has two streams of noise of its own."""
+_REAL = (types.Float, types.Integer)
+_TAKES = "must take (t, h, theta, h_dot, theta_dot) and give (force, torque)"
 
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """A force on the cart beside the actuator's, a matched disturbance, and a torque about the pivot.
+    """A force on the cart beside the actuator's, which is matched, and a torque about the pivot, which is not.
 
-    ``size w(t)`` from ``start`` on, 0 before, held over each integration step at its middle, with w = 1 for "constant"
-    and "step"; sin(2 pi frequency (t - start) + phase) for "sine"; for "pulses" 1 during the first ``width`` seconds of
-    each period, else 0. For "noise" the size is the standard deviation of w, which is Gauss-Markov noise, white noise
-    through a first-order low-pass with the cut-off ``bandwidth``: its autocorrelation is exp(-2 pi bandwidth |tau|), from
-    the first instant on, force and torque independent. "function" is one of one's own.
+    From ``start`` on they are ``force w(t)`` and ``torque w(t)``, before 0, with
 
-    ``force``, ``torque``, ``start``, ``frequency`` and ``phase`` may be a pair (low, high), from which each episode draws
-    its own, uniformly.
+    ::
+
+        constant, step   w = 1                                          a constant one begins at 0
+        sine             w = sin(2 pi frequency (t - start) + phase)
+        pulses           w = 1 for the first width seconds of each 1 / frequency since start, else 0
+        noise            w of mean 0, variance 1, autocorrelation exp(-2 pi bandwidth |tau|)
+
+    and held over a sampling period as they are at its middle. Noise is a Gauss-Markov process, white noise through a
+    first-order low-pass with the cut-off ``bandwidth``, exact at the samples and stationary from the first; that of
+    force and of torque are independent. A "function" is one's own, f(t, h, theta, h_dot, theta_dot) -> (force, torque)
+    in N and N m, of the time at the middle and the state at the beginning of a period.
 
     Args:
-        kind: one of :data:`KINDS`.
-        force: size in N.
-        torque: size in N m.
+        kind: one of :data:`~smo_gym.kernels.pushing.KINDS`.
+        force: size in N, of noise its standard deviation. Like the next four a number, or a pair (low, high) from which
+            each episode draws its own, uniformly.
+        torque: size in N m, as ``force``.
         start: in s.
-        frequency: in Hz, of "sine" and "pulses".
-        phase: in rad, of "sine".
-        width: of a pulse in s.
-        bandwidth: in Hz, of "noise".
-        function: f(t, h, theta, h', theta') -> (force, torque), which Numba can compile.
+        frequency: in Hz.
+        phase: in rad.
+        width: of a pulse in s, at most a period.
+        bandwidth: in Hz.
+        function: which Numba can compile.
 
     Raises:
-        ValueError: an unknown kind, or a value that is not allowed.
+        ValueError: an unknown kind, a value that is not allowed, or one that the kind has no use for.
     """
 
     kind: str = "constant"
-    force: float | tuple[float, float] = 0.0
-    torque: float | tuple[float, float] = 0.0
-    start: float | tuple[float, float] = 0.0
-    frequency: float | tuple[float, float] = 1.0
-    phase: float | tuple[float, float] = 0.0
+    force: Drawn = 0.0
+    torque: Drawn = 0.0
+    start: Drawn = 0.0
+    frequency: Drawn = 1.0
+    phase: Drawn = 0.0
     width: float = 0.1
     bandwidth: float = 1.0
     function: Function | None = None
@@ -134,22 +92,31 @@ class Disturbance:
             set_(self, name, _drawn(f"disturbance {name}", getattr(self, name)))
         for name in ("width", "bandwidth"):
             set_(self, name, number(f"disturbance {name}", getattr(self, name), above=0.0))
-        if min(self._ends("start")) < 0.0:
+        if self.ends("start")[0] < 0.0:
             raise ValueError(f"disturbance start={self.start!r} must be at least 0")
-        if min(self._ends("frequency")) <= 0.0:
+        if self.ends("frequency")[0] <= 0.0:
             raise ValueError(f"disturbance frequency={self.frequency!r} must be greater than 0")
-        if self.kind == "pulses" and self.width * max(self._ends("frequency")) > 1.0:
+        self._check_use()
+        if self.kind == "pulses" and self.width * self.ends("frequency")[1] > 1.0:
             raise ValueError(
-                f"disturbance width={self.width!r} must be at most a period of frequency={self.frequency!r}"
+                f"disturbance width={self.width!r} must be at most 1 / frequency for frequency={self.frequency!r}"
             )
-        if (self.kind == "function") != callable(self.function):
-            raise ValueError(
-                f"disturbance function={short(self.function)} must be given for the kind 'function', and for no other"
-            )
-        if self.function is not None:
+        if self.kind == "function":
             _tried(self.function)
 
-    def _ends(self, name: str) -> tuple[float, float]:
+    def _check_use(self) -> None:
+        """See that nothing is set which the kind would be silent about."""
+        for f in fields(self)[1:]:
+            value = getattr(self, f.name)
+            if value != f.default and f.name not in _OF_KIND[self.kind]:
+                users = [kind for kind, names in _OF_KIND.items() if f.name in names]
+                raise ValueError(
+                    f"disturbance {f.name}={short(value)} is of no use to kind={self.kind!r}: leave it out, or take "
+                    f"kind {' or '.join(map(repr, users))}"
+                )
+
+    def ends(self, name: str) -> tuple[float, float]:
+        """The pair (low, high) of a setting, both alike where it is a number."""
         value = getattr(self, name)
         return value if isinstance(value, tuple) else (value, value)
 
@@ -158,91 +125,105 @@ class Disturbance:
         """Disturbances that add up: from None for none, one, a mapping of its fields, a function, or several of these.
 
         Raises:
-            ValueError: it is none of these, a field is unknown, a value is not allowed, or two are functions.
+            ValueError: it is none of these, or a value is not allowed.
         """
         if value is None:
             return ()
         if isinstance(value, cls):
             return (value,)
         if isinstance(value, Mapping):
-            return (cls(**mapping("disturbance setting", value, [field.name for field in fields(cls)])),)
+            return (cls(**mapping("disturbance setting", value, [f.name for f in fields(cls)])),)
         if callable(value):
             return (cls("function", function=value),)
         if not isinstance(value, Sequence) or isinstance(value, str):
             raise ValueError(
-                f"disturbance={short(value)} must be a Disturbance, a mapping of its fields, a function or several of these"
+                f"disturbance={short(value)} must be a Disturbance, a mapping of its fields, a function or several"
             )
         found = tuple(one for each in value for one in cls.of(each))
-        if sum(one.function is not None for one in found) > 1:
-            raise ValueError(f"disturbance={short(value)} has several functions: let one of them add them up")
+        if sum(one.kind == "function" for one in found) > 1:
+            raise ValueError(f"disturbance={short(value)} must have at most one function: let it add them up")
         if len(found) > _MOST:
-            raise ValueError(f"disturbance has {len(found)} parts, it must have at most {_MOST}")
+            raise ValueError(f"disturbance={short(value)} must be at most {_MOST} at once, it is {len(found)}")
         return found
 
     @property
     def random(self) -> bool:
-        """Whether it differs from episode to episode."""
+        """Whether it depends on an episode's key."""
         return self.kind == "noise" or any(isinstance(getattr(self, name), tuple) for name in DRAWN)
 
     def check(self, dt: float, horizon: float) -> None:
-        """See that it acts within an episode of ``horizon`` seconds.
+        """See that it acts in episodes of ``horizon`` seconds which are sampled every ``dt`` seconds.
 
         Raises:
-            ValueError: it begins after its end.
+            ValueError: it begins behind the end, or a pulse is missed between two samples.
         """
-        if max(self._ends("start")) >= horizon:
-            raise ValueError(f"disturbance start={self.start!r} must be before the episode's end at {horizon:g} s")
-
-
-_MOST = 8
-"""Most disturbances at once: each has streams of its own."""
-
-
-def _drawn(name: str, value: Any) -> float | tuple[float, float]:
-    if not isinstance(value, list | tuple):
-        return number(name, value)
-    if len(value) != 2:
-        raise ValueError(f"{name}={short(value)} must be a number or a pair (low, high)")
-    low, high = (number(name, end) for end in value)
-    if low > high:
-        raise ValueError(f"{name}={short(value)} has low above high")
-    return low, high
-
-
-def _tried(function: Function) -> None:
-    """See that a function takes and gives what it must."""
-    try:
-        force, torque = getattr(function, "py_func", function)(0.0, 0.0, 0.0, 0.0, 0.0)
-        float(force), float(torque)
-    except Exception as error:  # whatever a user's function may raise
-        raise ValueError(
-            f"disturbance function={short(function)} must take (t, h, theta, h_dot, theta_dot) and give (force, torque): "
-            f"{type(error).__name__}: {error}"
-        ) from error
+        if self.ends("start")[1] >= horizon:
+            raise ValueError(f"disturbance start={self.start!r} s must be less than the horizon={horizon!r} s")
+        if self.kind == "pulses" and self.width < dt:
+            raise ValueError(f"disturbance width={self.width!r} s must be at least a sampling period dt={dt!r} s")
 
 
 def part(disturbances: Sequence[Disturbance], n: int, dt: float) -> Part:
-    """What disturbances put into a loop of n slots with a sampling period of ``dt`` seconds, before the plant.
+    """What disturbances put into a loop of n slots that is sampled every ``dt`` seconds, before the plant.
 
-    Their sum is in the rows PUSH. Where it is not finite, the slot fails, and the row REFUSED is the time in s.
+    Their sum is in the rows PUSH. Where it is not finite it is left out and fails the slot; the row REFUSED is then the
+    time in s. :func:`begin` tells slots their episodes.
     """
-    groups = [
-        columns(1, [0.0] * KEPT, math.exp(-_TWO_PI * each.bandwidth * dt), float(KINDS.index(each.kind)), [0.0] * 2)
-        for each in disturbances
-    ]
-    for each, group in zip(disturbances, groups, strict=True):
-        group[WIDTH] = each.width
-    rows = columns(n, np.zeros(2), dt, float(len(groups)), 0.0, *(np.repeat(group, n, axis=1) for group in groups))
+    kinds = [float(KINDS.index(each.kind)) for each in disturbances]
+    groups = np.zeros((len(kinds), pushing.GROUP))
+    for group, each, kind in zip(groups, disturbances, kinds, strict=True):
+        decay = 2.0 * math.pi * each.bandwidth * dt
+        group[pushing.KIND], group[pushing.WIDTH] = kind, each.width
+        group[pushing.KEPT], group[pushing.FRESH] = math.exp(-decay), math.sqrt(-math.expm1(-2.0 * decay))
+    rows = columns(n, np.zeros(pushing.FIRST), groups.ravel())
+    rows[pushing.DT], rows[pushing.HOW_MANY] = dt, len(kinds)
     begin(rows, slice(None), disturbances, np.zeros(n))
     functions = [each.function for each in disturbances if each.function is not None]
-    return Part(rows, sample=_with(functions[0]) if functions else _push, alike=(float(len(groups)),))
+    return Part(rows, sample=pushing.push_with(*functions) if functions else pushing.push, alike=(dt, *kinds))
 
 
 def begin(own: Array, slots: Slots, disturbances: Sequence[Disturbance], keys: Array) -> None:
-    """Draw, in some slots, what episodes of these keys have."""
-    own[KEY, slots] = keys
-    for k, each in enumerate(disturbances):
-        drawn = uniforms(keys, [STREAMS * k + _DRAWS + j for j in range(len(DRAWN))])
-        for row, name, u in zip((SIZE, SIZE + 1, START, FREQUENCY, PHASE), DRAWN, drawn, strict=True):
-            low, high = each._ends(name)
-            own[FIRST + k * _GROUP + row, slots] = low + (high - low) * u
+    """Tell a part's rows, of some slots, the keys of their episodes, and draw what these have of each disturbance."""
+    own[pushing.KEY, slots] = keys
+    rows = (pushing.SIZE, pushing.SIZE + 1, pushing.START, pushing.FREQUENCY, pushing.PHASE)
+    for d, each in enumerate(disturbances):
+        drawn = uniforms(keys, [STREAMS * d + _DRAWS + j for j in range(len(DRAWN))])
+        for row, name, u in zip(rows, DRAWN, drawn, strict=True):
+            low, high = each.ends(name)
+            own[pushing.FIRST + d * pushing.GROUP + row, slots] = low + (high - low) * u
+
+
+def _drawn(name: str, value: Any) -> Drawn:
+    """A number, or a pair of which the first is at most the second."""
+    shape = () if isinstance(value, str | Mapping) else shape_of(value)
+    if shape == ():
+        return number(name, value)
+    if shape != (2,):
+        raise ValueError(f"{name}={short(value)} must be a number or a pair (low, high)")
+    low, high = (number(name, end) for end in value)
+    if low > high:
+        raise ValueError(f"{name}={short(value)} must have low at most high")
+    return low, high
+
+
+def _tried(function: Any) -> None:
+    """See that a function takes and gives what it must, and that Numba can compile it."""
+    if not isinstance(plain(function), FunctionType):
+        raise ValueError(f"disturbance function={short(function)} must be a function, plain or compiled by Numba")
+    try:
+        inspect.signature(plain(function)).bind(*[0.0] * 5)
+    except TypeError as error:
+        raise ValueError(f"disturbance function={short(function)} {_TAKES}: {error}") from None
+    if not COMPILES:
+        return
+    given = (types.float64,) * 5
+    compiled = pushing.compiled(function)
+    try:
+        compiled.compile(given)
+    except NumbaError as error:
+        lines = re.sub(r"\x1b\[\d*m", "", str(error)).splitlines()
+        why = next((line for line in lines if line.strip() and not line.startswith("Failed in nopython")), "")
+        raise ValueError(f"disturbance function={short(function)} cannot be compiled by Numba: {why}") from error
+    result = compiled.overloads[given].signature.return_type
+    if [isinstance(each, _REAL) for each in getattr(result, "types", ())] != [True, True]:
+        raise ValueError(f"disturbance function={short(function)} {_TAKES}, two numbers; it gives {result}")
