@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .friction import Friction
 from .kernels import kernel, plain
 from .kernels.batch import LANES
 from .kernels.blocks import ALIVE, FAILED, U, X, at, block, finite, four, offsets, put, put_four
-from .kernels.cart_pendulum import drift_and_gain, energy
+from .kernels.cart_pendulum import answer, drift_and_gain, energy
 from .kernels.cart_pendulum import plant as _plant
 from .kernels.rk4 import rk4
 from .loop import Loop, Part, columns
@@ -34,6 +36,7 @@ class CartPendulum:
         bob_mass: m in kg.
         rod_length: l in m.
         gravity: g in m/s^2, of either sign.
+        friction: of cart and pivot, a :class:`~smo_gym.friction.Friction` or a mapping of its fields; none by default.
 
     Raises:
         ValueError: a mass or the length is not positive, or a value is not finite.
@@ -43,22 +46,28 @@ class CartPendulum:
     bob_mass: float = 0.32
     rod_length: float = 0.44
     gravity: float = -9.8
+    friction: Friction = field(default_factory=Friction)
 
     def __post_init__(self) -> None:
         for name in ("cart_mass", "bob_mass", "rod_length"):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
         object.__setattr__(self, "gravity", number("gravity", self.gravity))
+        object.__setattr__(self, "friction", Friction.of(self.friction))
+
+    def __repr__(self) -> str:
+        return f"CartPendulum({', '.join(f'{name}={value!r}' for name, value in self.as_dict().items())})"
 
     @classmethod
     def of(
         cls,
-        params: CartPendulum | Mapping[str, float] | ArrayLike | None,
+        params: CartPendulum | Mapping[str, Any] | ArrayLike | None,
         base: CartPendulum | None = None,
         name: str = "params",
     ) -> CartPendulum:
         """A plant from a plant, a mapping of field names, an array [M_c, m, l, g] or None.
 
-        What a mapping or None leaves out is taken from ``base`` (Table 2 by default). Messages call it by ``name``.
+        What is left out is taken from ``base`` (Table 2 by default): by an array the friction, which a mapping gives
+        as a whole. Messages call it by ``name``.
 
         Raises:
             ValueError: an unknown field, a wrong shape or a value that is not allowed.
@@ -70,20 +79,21 @@ class CartPendulum:
             return params
         if isinstance(params, Mapping):
             return replace(base, **mapping("plant parameter", params, [f.name for f in fields(cls)]))
-        return cls(*array(name, params, (4,)).tolist())
+        M_c, m, l, g = array(name, params, (4,)).tolist()
+        return cls(M_c, m, l, g, base.friction)
 
     def as_array(self) -> Array:
         """[M_c, m, l, g], shape (4,)."""
         return np.array([self.cart_mass, self.bob_mass, self.rod_length, self.gravity])
 
-    def as_dict(self) -> dict[str, float]:
-        """The fields by name, as :meth:`of` takes them."""
-        return asdict(self)
+    def as_dict(self) -> dict[str, Any]:
+        """The fields by name, as :meth:`of` takes them; friction where there is any."""
+        return {name: value for name, value in asdict(self).items() if name != "friction" or self.friction}
 
     def perturbed(self, delta: ArrayLike) -> CartPendulum:
-        """The plant whose M_c, m and l are each multiplied by ``1 + delta``, shape (3,); g is known."""
+        """The plant whose M_c, m and l are each multiplied by ``1 + delta``, shape (3,); g and friction stay."""
         M_c, m, l = self.as_array()[:3] * (1.0 + array("delta", delta, (3,)))
-        return CartPendulum(M_c, m, l, self.gravity)
+        return CartPendulum(M_c, m, l, self.gravity, self.friction)
 
     def draw(self, uncertainty: float, rng: np.random.Generator) -> CartPendulum:
         """One uncertain plant: M_c, m and l each times U(1 - x, 1 + x) (section 6).
@@ -103,13 +113,24 @@ class CartPendulum:
         """Kinetic and potential energy in J of states (4, ...): the integrand of equation (53).
 
         ``(M_c + m) h'^2 / 2 + m l^2 theta'^2 / 2 + m l h' theta' cos theta + m g l cos theta``
+
+        It changes at the rate ``F h'`` less what friction dissipates, ``c_v h'^2 + F_C |h'| + b theta'^2`` in W.
         """
         _, theta, v, omega = _states(x)
         return np.asarray(plain(energy)(np.cos(theta), v, omega, *self.as_array()))
 
     def drift(self, x: ArrayLike) -> Array:
-        """f(x) of equation (10) for states (4, n) or (4,), of the same shape."""
-        return self._split(x)[0]
+        """f(x) of equation (10) for states (4, n) or (4,), of the same shape, with the plant's viscous friction.
+
+        Coulomb friction is no part of it: at rest it is no function of x. Observers are told [M_c, m, l, g] alone, so
+        that to them all friction is uncertainty.
+        """
+        f, g = self._split(x)
+        if self.friction:
+            c, _, b = self.friction.as_array()
+            v, omega = np.asarray(x, dtype=np.float64)[2:]
+            f[2:] += plain(answer)(g[2], g[3], -c * v, -b * omega, *self.as_array()[:3])
+        return f
 
     def gain(self, x: ArrayLike) -> Array:
         """g(x) of equations (16)-(18) for states (4, n) or (4,), of the same shape."""
@@ -127,6 +148,8 @@ class CartPendulum:
     def linearise(self, theta: float = 0.0) -> tuple[Array, Array]:
         """A (4, 4) and B (4, 1) of ``x' = A x + B u`` about an equilibrium, theta a multiple of pi and u = 0.
 
+        Viscous friction is part of A. Coulomb friction is not: it has no slope at rest.
+
         Raises:
             ValueError: ``theta`` is no multiple of pi, hence no equilibrium without force.
         """
@@ -139,6 +162,9 @@ class CartPendulum:
         A[2, 1] = -m * g / M_c
         A[3, 1] = sign * (M_c + m) * g / (M_c * l)
         B = np.array([[0.0], [0.0], [1.0 / M_c], [-sign / (M_c * l)]])
+        c, _, b = self.friction.as_array()
+        force, torque = np.array([[-c, 0.0], [0.0, -b]])  # by h' and by theta'
+        A[2:, 2:] += plain(answer)(B[2, 0], B[3, 0], force, torque, M_c, m, l)
         return A, B
 
 

@@ -45,3 +45,44 @@ def plant(
     u, M_c, m, l, g = inputs
     f_h, f_theta, g_h, g_theta = drift_and_gain(theta, omega, M_c, m, l, g)
     return v, omega, f_h + g_h * u, f_theta + g_theta * u
+
+
+@inlined
+def answer(
+    g_h: float, g_theta: float, force: float, torque: float, M_c: float, m: float, l: float
+) -> tuple[float, float]:
+    """Accelerations that a force on the cart and a torque about the pivot add, with ``(g_h, g_theta)`` of (18).
+
+    The inverse of the mass matrix, which is symmetric: a torque moves the cart by as much as a force turns the rod.
+    """
+    return g_h * force + g_theta * torque, g_theta * force + (M_c + m) / (m * l * l) * g_h * torque
+
+
+@inlined
+def damped(
+    x: tuple[float, float, float, float],
+    s: float,
+    inputs: tuple[float, float, float, float, float, float, float, float],
+) -> tuple[float, float, float, float]:
+    """X' for ``inputs = (F, tau, c, b, M_c, m, l, g)``: :func:`plant` with a torque tau and viscous friction.
+
+    ``F - c h'`` acts on the cart and ``tau - b theta'`` about the pivot, each along its coordinate.
+    """
+    _, theta, v, omega = x
+    F, tau, c, b, M_c, m, l, g = inputs
+    f_h, f_theta, g_h, g_theta = drift_and_gain(theta, omega, M_c, m, l, g)
+    a_h, a_theta = answer(g_h, g_theta, F - c * v, tau - b * omega, M_c, m, l)
+    return v, omega, f_h + a_h, f_theta + a_theta
+
+
+@inlined
+def held(
+    x: tuple[float, float, float, float],
+    s: float,
+    inputs: tuple[float, float, float, float, float, float, float, float],
+) -> tuple[float, float, float, float]:
+    """X' while the cart is held at rest, for inputs as of :func:`damped`."""
+    _, theta, _, omega = x
+    _, tau, _, b, _, m, l, g = inputs
+    sin, _ = sincos(theta)
+    return 0.0, omega, 0.0, g * sin / l + (tau - b * omega) / (m * l * l)
