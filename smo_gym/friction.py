@@ -100,8 +100,8 @@ def _rub(signals: Array, own: Array, lanes: int) -> None:
     if met > 0.0:
         for i in range(lanes):
             x, new = four(own, BEFORE, i), four(signals, X, i)
-            exact = cut(x, new, _forces(signals, own, i), at(own, FRICTION + COULOMB, i), dt)
-            put_four(signals, X, i, exact if at(own, MET, i) > 0.0 else new)
+            forces, event = _forces(signals, own, i), at(own, MET, i) > 0.0
+            put_four(signals, X, i, cut(x, new, forces, at(own, FRICTION + COULOMB, i), dt) if event else new)
     for i in range(lanes):
         x, new = four(own, BEFORE, i), four(signals, X, i)
         alive, fine = at(signals, ALIVE, i) > 0.0, finite(new)

@@ -242,6 +242,8 @@ TRACKING = Task.of({"reference": shipped()}, HANGING)
 
 def plain_data(value: Any) -> Any:
     """A value as numbers, text, lists and mappings: dataclasses by field, arrays as lists, enumerations by value."""
+    if isinstance(value, CartPendulum):
+        return value.as_dict()
     if is_dataclass(value) and not isinstance(value, type):
         return {f.name: plain_data(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):

@@ -69,10 +69,8 @@ def cut(x: State, new: State, forces: Forces, coulomb: float, dt: float) -> Stat
     way, sticks = begins(x, forces, coulomb)
     onward = _pushed(new, forces)
     before, after = _along(x, forces, coulomb, onward), _along(new, forces, coulomb, onward)
-    at_rest = _root(
-        way * x[2], way * new[2], dt * _along(x, forces, coulomb, way), dt * _along(new, forces, coulomb, way)
-    )
-    s = before / (before - after) if sticks else at_rest
+    slope, last = dt * _along(x, forces, coulomb, way), dt * _along(new, forces, coulomb, way)
+    s = before / (before - after) if sticks else _root(way * x[2], way * new[2], slope, last)
     h, theta, _, omega = rk4(_rhs, x, (_against(forces, way * coulomb), sticks), s * dt)
     middle = h, theta, 0.0, omega
     next_way, rests = begins(middle, forces, coulomb)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict
 from typing import Any, NamedTuple
 
 from ...article import OBSERVER_GAINS
@@ -42,10 +41,10 @@ def _plant(scenario: Scenario, outcomes: Sequence[Outcome]) -> Iterable[_Row]:
             if o.group.scenario is scenario and o.group.uncertainty == 0.0 and o.plants is not None
         )
     )
-    printed = asdict(CartPendulum())
+    printed = CartPendulum().as_dict()
     params = scenario.options["params"].value if "params" in scenario.options else {}
     given = params if isinstance(params, dict) else printed  # or all, as [M_c, m, l, g]
-    for name, value in asdict(plant).items():
+    for name, value in plant.as_dict().items():
         same = value == printed[name]
         where = "Table 2" if same else "options.params" if name in given else scenario.environment
         yield _Row(f"plant.{name}", f"{value:g}", "printed" if same else "chosen", f"{_PLANT[name]}; {where}")
