@@ -1,10 +1,10 @@
-"""Where a line may end: not between a number and its unit, but inside a long name in a table, where its parts meet."""
+"""Where a line may end: not between a number and what it counts, but inside a long name in a table."""
 
 import re
 from typing import Any
 
 _CODE = re.compile(r"(<pre.*?</pre>|<code.*?</code>)", re.DOTALL)
-_UNIT = re.compile(r"(?<=\d) (?=(?:%|[mnu]?s|m|N|rad|MB|of \d+)(?!\w))|(?<=\d,) (?=LQR|SMC)")
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|[mnu]?s|m|N|rad|MB|of \d+)(?!\w))|(?<=Table) (?=\d)|(?<=\d,) (?=LQR|SMC)")
 _TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 _JOINT = re.compile(r"(?<=[a-z])(?<!\btest)(?=_)|(?<=::)|(?<=[a-z]/)(?=\w)|(?<=[a-z]\.)(?!py|md|yaml)(?=[a-z])")
 

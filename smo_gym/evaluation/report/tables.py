@@ -108,7 +108,7 @@ def summary(results: Sequence[Result]) -> str:
     return (
         f"{len(cells)} published MSE cells in all: {near} within 10 %, {inside} within the 95 % interval of our mean, "
         f"{foreseen} within that of another mean of ten runs, where 95 % would be {0.95 * len(cells):.0f}."
-        + (f" In {fallen} no run stands: they are missed." if fallen else "")
+        + (f" In {fallen} no run stands, so missed." if fallen else "")
     )
 
 
