@@ -5,11 +5,16 @@ from typing import Any
 
 import griffe
 
+_PAGE = "\n## Description\n"
+"""Where a docstring in Gymnasium's form goes on with what the environment's own page has, all but its errors."""
 _ROLE = re.compile(r":(?:class|func|meth|data|mod|attr):`(~?)([\w.]+)`")
 
 
 def linked(text: str, scope: griffe.Object) -> str:
     """A docstring with its roles as Markdown cross-references, and its literal blocks as Markdown's."""
+    text, rest = text.partition(_PAGE)[::2]
+    if rest:
+        text += "\n[Its page](../environments/pendulum.md) says more.\n" + "".join(rest.partition("\nRaises:")[1:])
 
     def link(role: re.Match[str]) -> str:
         short, name = role.groups()

@@ -31,7 +31,10 @@ def on_page_markdown(markdown: str, **kwargs: Any) -> str:
 
 def commands() -> str:
     """The help of every command."""
-    return "\n\n".join(f"## smo-gym {name}\n\n{output(name, '--help')}" for name in sorted(COMMANDS))
+    return "\n\n".join(
+        f"## smo-gym {name}\n\n{output(name, '--help').replace('.terminal', '.terminal .help', 1)}"
+        for name in sorted(COMMANDS)
+    )
 
 
 def output(name: str, *arguments: str) -> str:
@@ -104,7 +107,11 @@ def environment(name: str) -> str:
     ]
     parts = [tabulate(facts, ("", ""), "github", disable_numparse=True)]
     if cls is not base:
-        parts += [_text(cls), _differences(env.unwrapped.task), "What follows holds for all three environments."]
+        parts += [
+            _text(cls),
+            _differences(env.unwrapped.task),
+            "What follows holds for all three environments, but for what differs above.",
+        ]
     parts += [_text(base), f"## Version History\n\n- `{name}`: the first version, since smo_gym 0.1.0"]
     return "\n\n".join(parts).replace("## Rewards\n", f"## Rewards\n\n{_reward()}\n", 1)
 

@@ -12,7 +12,7 @@ from mkdocs.structure.files import File, Files
 
 from smo_gym.cli.commands import main
 
-COMMAND = "evaluate --controller lqr --scenario regulation --uncertainty 0.2 --runs 2"
+COMMAND = "evaluate --controller all --scenario regulation --uncertainty 0.2 --runs 50"
 
 
 def on_files(files: Files, config: MkDocsConfig, **kwargs: Any) -> Files:

@@ -32,7 +32,7 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
     ## Description
 
     A cart on a track carries a rod with a bob at its end; a force moves the cart. Every episode draws its own plant:
-    cart mass, bob mass and rod length are each scaled by U(1 - x, 1 + x), and the agent is told neither. Encoders
+    cart mass, bob mass and rod length are each scaled by U(1 - x, 1 + x), and the agent is told none of it. Encoders
     measure where the cart and the rod are, not how fast they move. The goal is to bring both to rest at zero.
 
     `SMOPendulum-v0` is the article's plant, with its g = -9.8 m/s^2: theta = 0 is the *hanging* equilibrium.

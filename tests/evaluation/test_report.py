@@ -138,6 +138,19 @@ def test_the_score_counts_cells_beside_the_ceiling(page):
     assert page_numbers.score(sure).ceiling == 0.5 * score.cells
 
 
+def test_a_published_cell_in_which_no_run_stands_is_missed(page):
+    results = page[1]
+    first = tables.compared(results)[0]
+    fallen = dataclasses.replace(first, measured=math.nan, ci_low=math.nan, ci_high=math.nan, half_width=math.nan)
+    with_it = [fallen if result is first else result for result in results]
+    score, before = page_numbers.score(with_it), page_numbers.score(results)
+    assert (score.cells, score.near) == (before.cells, before.near - tables.within(first))
+    assert tables.summary(with_it).startswith(f"{before.cells} published MSE cells in all: {score.near} within 10 %")
+    assert tables.summary(with_it).endswith(" In 1 no run stands, so missed.")
+    assert tables.verdict([fallen]).startswith("1 published MSE cells: no run stands. ")
+    assert math.isnan(page_numbers.score([fallen]).ceiling)
+
+
 @pytest.mark.parametrize("value", [-0.04, -0.0])
 def test_nothing_is_minus_zero(value):
     assert page_numbers._percent(value) == "0.0 %"

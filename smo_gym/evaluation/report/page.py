@@ -185,15 +185,16 @@ def _tables(outcomes: Sequence[Outcome], results: Iterable[Result]) -> list[dict
 
 def _diagnosed(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     """The diagnostics of each table and controller, a row a metric and a column an arm: as wide as a phone."""
-    (_, _, _, *names), rows = tables.diagnosed(outcomes)
-    blocks: dict[str, list[tuple[str, ...]]] = {}
-    for table, controller, *column in rows:
-        blocks.setdefault(f"Table {table}, {controller}", []).append(tuple(column))
+    header, rows = tables.diagnosed(outcomes)
+    blocks: dict[str, list[dict[str, str]]] = {}
+    for row in rows:
+        column = dict(zip(header, row, strict=True))
+        blocks.setdefault(f"Table {column.pop('table')}, {column.pop('controller')}", []).append(column)
     found = []
     for title, columns in blocks.items():
-        arms, *metrics = zip(*columns, strict=True)
-        named = zip(map(_typeset, names), metrics, strict=True)
-        values = [(name, [_in_full(value) for value in row]) for name, row in named if any(row)]
+        arms = tuple(column.pop("arm") for column in columns)
+        metrics = [(name, [column[name] for column in columns]) for name in columns[0]]
+        values = [(_typeset(name), [*map(_in_full, shown)]) for name, shown in metrics if any(shown)]
         found.append({"title": title, "arms": arms, "rows": values})
     return found
 

@@ -72,11 +72,8 @@ def effects(outcomes: Sequence[Outcome], results: Sequence[Result]) -> list[Effe
 
 def score(results: Sequence[Result]) -> Score | None:
     """The score over all tables; None where nothing is published."""
-    cells = [r for r in results if r.cell.metric == "mse" and not r.cell.is_average and math.isfinite(r.deviation)]
-    if not cells:
-        return None
-    near = sum(abs(math.expm1(r.deviation)) <= 0.1 for r in cells)
-    return Score(len(cells), near, sum(r.ceiling for r in cells))
+    cells = tables.compared(results)
+    return Score(len(cells), sum(map(tables.within, cells)), tables.ceiling(cells)) if cells else None
 
 
 def _reduction(row: Result, state: str) -> Number:

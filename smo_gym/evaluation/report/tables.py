@@ -57,15 +57,17 @@ def verdict(rows: Sequence[Result]) -> str:
     mse = [row for row in rows if row.cell.metric == "mse"]
     counted = [row for row in mse if row.cell.state == "h" and not row.cell.is_average]
     failed = f"{sum(row.failures for row in counted)} of {sum(row.runs for row in counted)} runs failed."
-    off = np.array([row.deviation for row in mse if not row.cell.is_average and math.isfinite(row.deviation)])
+    cells = compared(rows)
+    off = np.array([row.deviation for row in cells if math.isfinite(row.deviation)])
     averages = [row.deviation for row in mse if row.cell.is_average and math.isfinite(row.deviation)]
     if not off.size:
-        return f"No published cell to compare with. {failed}"
+        none = f"{len(cells)} published MSE cells: no run stands" if cells else "No published cell to compare with"
+        return f"{none}. {failed}"
     furthest = off[np.argmax(np.abs(off))]
-    most = sum(row.ceiling for row in mse if not row.cell.is_average and math.isfinite(row.deviation))
+    most = ceiling(cells)
     return (
-        f"{off.size} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(off**2)):.1f} %, "
-        f"{np.count_nonzero(np.abs(np.expm1(off)) <= 0.1)} within 10 %"
+        f"{len(cells)} published MSE cells: RMS of log(measured/published) {100 * np.sqrt(np.mean(off**2)):.1f} %, "
+        f"{sum(map(within, cells))} within 10 %"
         + (f" (means of ten runs would come to {most:.1f} with every setting exact), " if math.isfinite(most) else ", ")
         + f"furthest off {100 * np.expm1(furthest):+z.1f} %. "
         + (f"Averages off {', '.join(f'{100 * np.expm1(a):+z.1f} %' for a in averages)}. " if averages else "")
@@ -78,22 +80,35 @@ def title(controller: str) -> str:
     return controller.upper() if re.fullmatch(r"[\w -]*", controller) else formats.line(controller)
 
 
+def compared(results: Iterable[Result]) -> list[Result]:
+    """The published MSE cells. One in which no run stands is missed, not left out."""
+    return [r for r in results if r.cell.metric == "mse" and not r.cell.is_average and r.published > 0.0]
+
+
 def within(result: Result) -> bool:
     """Whether a measured number is within 10 % of the published one."""
     return bool(abs(math.expm1(result.deviation)) <= 0.1)
 
 
+def ceiling(cells: Iterable[Result]) -> float:
+    """How many cells means of ten runs would meet with every setting exact; NaN from ten runs or fewer."""
+    chances = [row.ceiling for row in cells if math.isfinite(row.deviation)]
+    return sum(chances) if chances else math.nan
+
+
 def summary(results: Sequence[Result]) -> str:
     """How many published MSE cells are met."""
-    cells = [r for r in results if r.cell.metric == "mse" and not r.cell.is_average and math.isfinite(r.deviation)]
+    cells = compared(results)
     if not cells:
         return "Nothing is published for these runs to compare with."
     near = sum(map(within, cells))
     inside = sum(r.ci_low <= r.published <= r.ci_high for r in cells)
     foreseen = sum(abs(r.published - r.measured) <= r.half_width for r in cells)
+    fallen = sum(not math.isfinite(r.deviation) for r in cells)
     return (
         f"{len(cells)} published MSE cells in all: {near} within 10 %, {inside} within the 95 % interval of our mean, "
         f"{foreseen} within that of another mean of ten runs, where 95 % would be {0.95 * len(cells):.0f}."
+        + (f" In {fallen} no run stands, so missed." if fallen else "")
     )
 
 

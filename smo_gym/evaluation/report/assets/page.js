@@ -155,8 +155,9 @@ filter($("#filter"));
 effect();
 try {
   await unpack();
-  const last = data.groups.findLast((group) => group.table === data.groups[0].table && group.controller === data.groups[0].controller);
-  choose(Object.fromEntries(KEYS.map((key) => [key, values[key](last)])));
+  const table = data.groups.filter((group) => group.table === data.groups[0].table && group.controller === data.groups[0].controller);
+  const first = table.findLast((group) => group.arm === "with") ?? table.at(-1);
+  choose(Object.fromEntries(KEYS.map((key) => [key, values[key](first)])));
   const script = document.createElement("script");
   script.textContent = new TextDecoder().decode(await inflate("plotly"));
   document.head.append(script);
