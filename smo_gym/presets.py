@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -26,14 +27,14 @@ class Preset(Generic[T]):
 _TURN = 2.0 * math.pi
 _DEGREE = math.pi / 180.0
 _CART_POLE = (
-    "measured: 90 swing-ups of a cart on a belt with a pole on a potentiometer (SensorsINI/CartPoleSimulation, "
+    "measured: 60 swing-ups of a cart on a belt with a pole on a potentiometer (SensorsINI/CartPoleSimulation, "
     "recordings V1)"
 )
 _SUITE = (
-    "Real-World RL suite, combined challenge {!r} (Dulac-Arnold et al., Challenges of real-world reinforcement learning, "
-    "Machine Learning 110, 2021): noise {} on each observation, delay of {} steps, dropped and stuck sensors with "
-    "probability {} for {} steps, at the 10 ms a step of its cart pole. There a dropped value is 0, here the last one; "
-    "there the noise is on cos and sin of the angle"
+    "Real-World RL suite, combined challenge {!r} (Dulac-Arnold et al., Challenges of real-world reinforcement "
+    "learning, Machine Learning 110, 2021): noise of {} on each observation, a delay of {} steps, dropped and stuck "
+    "sensors with probability {} for {} steps, at the 10 ms a step of its cart pole. There a dropped value is 0, here "
+    "the last one; there the noise is on cos and sin of the angle"
 )
 
 
@@ -76,14 +77,16 @@ SENSORS = {
             dropout=(9e-5, 9e-5),
             dropout_samples=(20, 20),
         ),
-        f"{_CART_POLE}: counts of 85 um and 2 pi / 4096 of reading; noise of 0.80 counts at rest to 1.25 beyond 9 rad/s; "
-        "1 rad of reading is 0.96 rad; the reading sticks from 1.15 rad on for 0.25 rad; 0.18 % of samples missing; its "
-        "period of 20.29 ms taken as 20 ms",
+        f"{_CART_POLE}: counts of 85 um and 2 pi / 4096 of reading; noise of 0.80 counts at rest to 1.25 beyond "
+        "9 rad/s; the reading sticks from 1.15 rad on for 0.25 rad, once a turn; 0.18 % of samples missing; the "
+        "period of "
+        "20.29 ms taken as 20 ms. Its scale, 0.96 rad for 1 rad of reading, makes up for the gap and is left out",
     ),
     "qube": Preset(
         Sensor(resolution=(1e-4, _TURN / 2048), update_period=(0.002, 0.002)),
-        "measured: Quanser QUBE-Servo, 12 recordings at 500 Hz (decargroup/closed_loop_koopman): 2048 counts a turn and no "
-        "noise beyond; it has no cart, whose 0.1 mm is chosen",
+        "measured: Quanser QUBE-Servo, 12 recordings at 500 Hz (decargroup/closed_loop_koopman): 2048 counts a "
+        "turn and "
+        "no noise beyond; it has no cart, whose 0.1 mm is chosen",
     ),
     "rwrl-easy": _suite("easy", 0.1, 3, 0.01, 1),
     "rwrl-medium": _suite("medium", 0.3, 6, 0.05, 5),
@@ -91,13 +94,50 @@ SENSORS = {
 }
 ACTUATORS = {
     "ideal": Preset(Actuator(), "the article: the force that is asked for reaches the cart"),
+    "cart-pole": Preset(
+        Actuator(unit=26.49, back_emf=44.88),
+        f"{_CART_POLE}: 9.56 m/s^2 at full command and 16.2 1/s of back-EMF, all viscous friction of the cart "
+        "in it, on "
+        "2.77 kg that move; no delay (0 to 0.4 ms). Newtons follow from the 0.087 kg of its pole",
+    ),
+    "lag": Preset(Actuator(time_constant=0.005), "chosen: a current loop of some 30 Hz"),
+    "rwrl-easy": Preset(Actuator(delay=30), "Real-World RL suite, combined challenge 'easy': 3 steps of 10 ms"),
+    "rwrl-medium": Preset(Actuator(delay=60), "Real-World RL suite, combined challenge 'medium': 6 steps of 10 ms"),
+    "rwrl-hard": Preset(Actuator(delay=90), "Real-World RL suite, combined challenge 'hard': 9 steps of 10 ms"),
 }
 FRICTIONS = {
     "none": Preset(Friction(), "the article: no friction"),
+    "cart-pole": Preset(
+        Friction(cart_coulomb=0.504, pivot_viscous=3.53e-4),
+        f"{_CART_POLE}: 0.182 m/s^2 of Coulomb friction on 2.77 kg, 0.078 1/s about the pivot; viscous friction of the "
+        "cart cannot be told from back-EMF and is in the actuator",
+    ),
+    "ip02": Preset(
+        Friction(cart_viscous=5.4, pivot_viscous=0.0024),
+        "data sheet: Quanser IP02 with the medium pendulum, viscous damping of cart and pendulum of its workbook",
+    ),
 }
 DISTURBANCES: dict[str, Preset[tuple[Disturbance, ...]]] = {
     "none": Preset((), "the article: no disturbance"),
+    "cart-pole": Preset(
+        (Disturbance("noise", force=1.54, bandwidth=15.0),),
+        f"{_CART_POLE}: process noise of 0.081 m/s^2 per root Hz on 2.77 kg, 0.22 N per root Hz, as noise below 15 Hz, "
+        "a cut-off that is chosen",
+    ),
+    "push": Preset(
+        (Disturbance("step", force=(-1.0, 1.0), start=(1.0, 5.0)),),
+        "chosen: a steady push of up to 1 N that begins within the first seconds",
+    ),
 }
+
+
+KINDS: dict[str, Mapping[str, Preset[Any]]] = {
+    "sensor": SENSORS,
+    "actuator": ACTUATORS,
+    "friction": FRICTIONS,
+    "disturbance": DISTURBANCES,
+}
+"""All presets by the option that takes them."""
 
 
 def sensor(value: Any) -> Sensor:

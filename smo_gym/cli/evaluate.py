@@ -20,7 +20,7 @@ from typing import Any
 import yaml
 from tqdm import tqdm
 
-from .. import files
+from .. import files, presets
 from ..article import WITH, WITHOUT
 from ..evaluation import configs, formats, scenario, study
 from ..evaluation.arms import ARMS, EVERY, PRINTED, SMO
@@ -28,7 +28,7 @@ from ..evaluation.report import answer, figures, page, tables
 from ..evaluation.statistics import Result, results
 from ..policies import named
 from ..validation import choice, unknown
-from . import computing, presets
+from . import computing
 from .answer import show
 from .arguments import Parser, fraction, one_of, positive, several, versions
 from .entry import Stop, command, said, typed

@@ -7,21 +7,14 @@ smo-gym presets sensor cart-pole   # one, every field of it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from typing import Any
 
-from .. import presets
+from ..presets import KINDS, Preset
 from ..validation import choice
 from .arguments import Parser, one_of
 from .console import screen
 from .entry import command
-
-KINDS: dict[str, Mapping[str, presets.Preset[Any]]] = {
-    "sensor": presets.SENSORS,
-    "actuator": presets.ACTUATORS,
-    "friction": presets.FRICTIONS,
-    "disturbance": presets.DISTURBANCES,
-}
 
 
 @command("presets")
@@ -39,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _show(kinds: Mapping[str, Mapping[str, presets.Preset[Any]]], name: str | None) -> None:
+def _show(kinds: Mapping[str, Mapping[str, Preset[Any]]], name: str | None) -> None:
     from rich.padding import Padding
 
     console = screen()
@@ -58,11 +51,10 @@ def said(settings: Any, whole: bool = False) -> str:
     """Settings by field: all, or those that are not the default."""
     if isinstance(settings, tuple):
         return "; ".join(said(each, whole) for each in settings)
-    assert is_dataclass(settings)
+    usual = type(settings)()
     values = {field.name: getattr(settings, field.name) for field in fields(settings)}
-    usual = type(settings)() if not whole else None
     return ", ".join(
-        f"{field}={_short(value)}" for field, value in values.items() if whole or value != getattr(usual, field)
+        f"{name}={_short(value)}" for name, value in values.items() if whole or value != getattr(usual, name)
     )
 
 

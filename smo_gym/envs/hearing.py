@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..friction import FRICTION, Friction
+from ..friction import FRICTION
 from ..loop import Loop, Slots
 from ..typing import Array
 from .task import Task
@@ -45,7 +45,7 @@ class Hearing:
     def __init__(self, task: Task) -> None:
         self._task = task
         self._plain = task.ideal and task.sensor.exact
-        self._rubs = task.rubs != Friction()
+        self._rubs = bool(task.rubs)
 
     def still(self, loop: Loop) -> Heard:
         """Plants that have not moved yet."""

@@ -14,7 +14,8 @@ from gymnasium import spaces
 from .. import presets
 from ..actuators import Actuator
 from ..disturbances import Disturbance
-from ..plant import CartPendulum, Friction
+from ..friction import Friction
+from ..plant import CartPendulum
 from ..reference import Reference, shipped
 from ..sensors import Sensor
 from ..typing import Array
@@ -116,8 +117,10 @@ class Task:
         set_(self, "actuator", presets.actuator(self.actuator))
         set_(self, "disturbance", presets.disturbance(self.disturbance))
         set_(self, "friction", presets.friction(self.friction))
-        for part in (self.sensor, self.actuator, *self.disturbance):
-            part.check(self.dt, self.horizon)
+        self.sensor.check(self.dt, self.horizon)
+        self.actuator.check(self.dt, self.horizon)
+        for each in self.disturbance:
+            each.check(self.dt, self.horizon)
         if self.reference is not None and self.reference.params != tuple(self.params.as_array().tolist()):
             raise ValueError(
                 f"reference was computed for the plant {self.reference.params}, it must be for params={self.params}"
@@ -174,12 +177,12 @@ class Task:
     @property
     def ideal(self) -> bool:
         """Whether the force that is asked for, and no other, moves a plant without friction."""
-        return self.actuator.ideal and not self.disturbance and self.rubs == Friction()
+        return self.actuator.ideal and not self.disturbance and not self.rubs
 
     @property
     def random(self) -> bool:
         """Whether anything in an episode is random beside its plant and initial state."""
-        rubs = self.friction_uncertainty > 0.0 and self.rubs != Friction()
+        rubs = self.friction_uncertainty > 0.0 and bool(self.rubs)
         return rubs or self.sensor.random or any(each.random for each in self.disturbance)
 
     def draw(self, rng: np.random.Generator) -> Case:

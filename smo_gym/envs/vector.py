@@ -114,8 +114,9 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         Args:
             seed: an integer s seeds slot i with s + i; a sequence gives each slot its own.
             options: ``state`` (4,) or (n, 4), ``params`` (4,), (n, 4) or a mapping, ``reset_mask`` (n,) of bool,
-                ``noise``, whole numbers () or (n,), ``steps``, whole numbers () or (n,): the control periods after which this one episode is truncated,
-                at most those of the horizon, so that slots need not end together. Later episodes have the horizon.
+                ``noise``, whole numbers () or (n,), ``steps``, whole numbers () or (n,): the control periods after
+                which this one episode is truncated, at most those of the horizon, so that slots need not end together.
+                Later episodes have the horizon.
         """
         options = mapping("reset option", options or {}, (*RESET_OPTIONS, "reset_mask", "steps"))
         mask = marked(options.pop("reset_mask", self._everywhere), self.num_envs)
@@ -251,9 +252,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         }
         if self._desired is not None:
             info["desired"] = self._desired.positions[self._k]
-        return {
-            key: value for name, told in info.items() for key, value in ((name, told), (f"_{name}", self._everywhere))
-        }
+        return info | {f"_{name}": self._everywhere for name in info}
 
 
 def only(values: NDArray[Any], slots: Flags) -> NDArray[Any]:

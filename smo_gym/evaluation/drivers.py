@@ -67,7 +67,7 @@ def driven(env: PendulumVectorEnv, law: Any, parts: Mapping[str, Part], watch: W
 
 
 def unit_of(agent: Agent, task: Task) -> float:
-    """What an agent's forces are divided by to be actions of the environment: a law that runs in a loop says newtons."""
+    """What an agent's forces are divided by to be actions: a law that runs in a loop says newtons."""
     return task.actuator.unit if runs_as_part(agent, "predict") else 1.0
 
 

@@ -85,7 +85,9 @@ def test_episodes_that_begin_later_are_those_of_any_mode(mode):
     one.reset(seed=4)
     for observation, params, friction in found:
         here, told = one.reset()
-        assert equal(observation[1], here) and equal(params[1], told["params"]) and equal(friction[1], told["friction"])
+        assert equal(observation[1], here)
+        assert equal(params[1], told["params"])
+        assert equal(friction[1], told["friction"])
 
 
 def test_an_episode_is_replayed_by_its_state_plant_and_noise():
@@ -104,7 +106,8 @@ def test_noise_is_drawn_after_plant_and_state():
     quiet, noisy = (gymnasium.make("SMOPendulum-v0", **options) for options in ({}, ROUGH))
     for _ in range(3):
         told = [env.reset(seed=5)[1] for env in (quiet, noisy)]
-        assert equal(told[0]["params"], told[1]["params"]) and equal(told[0]["state"], told[1]["state"])
+        assert equal(told[0]["params"], told[1]["params"])
+        assert equal(told[0]["state"], told[1]["state"])
 
 
 def test_samples_are_measured_and_positions_true():
@@ -113,7 +116,8 @@ def test_samples_are_measured_and_positions_true():
     np.testing.assert_allclose(observation, [0.6, -0.05], atol=1e-15)
     for _ in range(3):
         np.testing.assert_allclose(info["samples"] - info["positions"], [[0.5, -0.25]] * 20, atol=1e-15)
-        assert equal(observation, info["samples"][-1]) and equal(info["state"][:2], info["positions"][-1])
+        assert equal(observation, info["samples"][-1])
+        assert equal(info["state"][:2], info["positions"][-1])
         observation, _, _, _, info = env.step(np.array([2.0]))
 
 
@@ -187,7 +191,9 @@ def test_ended_slots_hold_still():
     for _ in range(5):
         later, *_, info = env.step(np.ones((2, 1)))
         assert equal(later[0], observation[0])
-        assert (info["samples"][0] == observation[0]).all() and info["force"][0] == 0.0 and info["asked"][0] == 0.0
+        assert (info["samples"][0] == observation[0]).all()
+        assert info["force"][0] == 0.0
+        assert info["asked"][0] == 0.0
 
 
 def test_copies_and_spawned_environments_are_alike():
@@ -257,11 +263,14 @@ def refused_or_worked(options):
     try:
         env = gymnasium.make("SMOPendulum-v0", disable_env_checker=True, **options)
     except ValueError as error:
-        assert any(name in str(error) for given in options.values() for name in given), error
+        if not any(name in str(error) for given in options.values() for name in given):
+            raise AssertionError(f"{options} is refused without a name") from error
         return False
     env.reset(seed=0)
     observation, reward, _, _, info = env.step(np.array([1.0]))
-    assert np.isfinite(observation).all() and np.isfinite(reward) and np.isfinite(info["force"])
+    assert np.isfinite(observation).all()
+    assert np.isfinite(reward)
+    assert np.isfinite(info["force"])
     return True
 
 
