@@ -109,12 +109,14 @@ def setting(text: str) -> Any:
     """An option's value: a name, or YAML.
 
     Raises:
-        ValueError: it is no YAML.
+        argparse.ArgumentTypeError: it is no YAML.
     """
     try:
         return yaml.safe_load(text)
     except yaml.YAMLError as error:
-        raise ValueError(f"{text!r} is neither a name nor YAML: {error}") from None
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is neither a name nor YAML: {files.shortened(str(error))}"
+        ) from None
 
 
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
@@ -130,14 +132,8 @@ def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
     if arguments.force_limit is not None:
         changes["force_limit"] = arguments.force_limit
     between = {name: value for name in presets.KINDS if (value := getattr(arguments, name)) is not None}
-    if between:
-        given = {name: {"value": value, "source": "chosen", "note": "command line"} for name, value in between.items()}
-        found = [place.changed(options={**place.options, **given}) for place in found]
-    changed = [place.changed(note="command line", **changes) for place in found]
-    if between:
-        for place in changed:
-            place.make()  # notices a value that is not allowed
-    return changed
+    chosen = [place.with_options("command line", **between) for place in found] if between else found
+    return [place.changed(note="command line", **changes) for place in chosen]
 
 
 def chosen(

@@ -124,6 +124,17 @@ class Scenario(Settings):
             "track_limit": self.track_limit.value,
         }
 
+    def with_options(self, note: str = "", **values: Any) -> Scenario:
+        """The scenario with further options of the environment, chosen ones, such as ``sensor="encoders"``.
+
+        Raises:
+            ValueError: an option is unknown, or its value is not allowed.
+        """
+        chosen = {name: {"value": value, "source": "chosen", "note": note} for name, value in values.items()}
+        more = reading.validated({**dict(self), "options": {**self.options, **chosen}}, Scenario)
+        more.make()
+        return more
+
     def make(self) -> VectorEnv[Array, Array, Array]:
         """One slot of the environment, to ask and to try things in.
 
