@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..friction import FRICTION
@@ -11,41 +9,34 @@ from ..loop import Loop, Slots
 from ..typing import Array
 from .task import Task
 
+Heard = tuple[Array, Array, Array, Array, dict[str, Array]]
+"""Of a control period of n slots: where the plants were at each sampling instant, (substeps, 2, n); what was measured
+then; the force in N that was asked for, within the limit, (n,); the mean force that reached the cart; and what only
+some tasks have, (..., n): :class:`~smo_gym.envs.pendulum.PendulumEnv` says what and when.
 
-@dataclass(frozen=True, slots=True)
-class Heard:
-    """What was measured and what was true in a control period of n slots."""
+A plain tuple, for it is made in every step; forces may be the loop's own."""
 
-    positions: Array
-    """Where the plants were at each sampling instant, (substeps, 2, n)."""
-    samples: Array
-    """What was measured then, (substeps, 2, n)."""
-    asked: Array
-    """The force in N that was asked for, within the limit, (n,)."""
-    force: Array
-    """The force in N that reached the cart, the mean over the period, (n,)."""
-    more: dict[str, Array]
-    """What only some tasks have, (..., n): :class:`~smo_gym.envs.pendulum.PendulumEnv` says what and when."""
 
-    def held(self, loop: Loop, slots: Slots) -> Heard:
-        """The same but for some slots, where nothing has moved and no force has acted."""
-        more = {name: values.copy() for name, values in self.more.items()}
-        for name, values in more.items():
-            values[..., slots] = loop.own("plant")[FRICTION : FRICTION + 3, slots] if name == "friction" else 0.0
-        held = Heard(self.positions.copy(), self.samples.copy(), self.asked.copy(), self.force.copy(), more)
-        held.positions[:, :, slots] = loop.x[:2, slots]
-        held.samples[:, :, slots] = loop.y[:, slots]
-        held.asked[slots] = held.force[slots] = 0.0
-        return held
+def held(heard: Heard, loop: Loop, slots: Slots) -> Heard:
+    """The same but for some slots, where nothing has moved and no force has acted."""
+    positions, samples, asked, force = (values.copy() for values in heard[:4])
+    more = {name: values.copy() for name, values in heard[4].items()}
+    positions[:, :, slots], samples[:, :, slots] = loop.x[:2, slots], loop.y[:, slots]
+    asked[slots] = force[slots] = 0.0
+    for name, values in more.items():
+        values[..., slots] = loop.own("plant")[FRICTION : FRICTION + 3, slots] if name == "friction" else 0.0
+    return positions, samples, asked, force, more
 
 
 class Hearing:
     """Listens to a task's loop."""
 
     def __init__(self, task: Task) -> None:
-        self._task = task
-        self._plain = task.ideal and task.sensor.exact
-        self._rubs = bool(task.rubs)
+        sensor, actuator = task.sensor, task.actuator
+        self._plain = task.ideal and sensor.exact
+        self._exact, self._ideal = sensor.exact, actuator.ideal
+        self._rubs, self._pushed = bool(task.rubs), bool(task.disturbance)
+        self._stamped, self._measured = sensor.jitter > 0.0, actuator.measured
 
     def still(self, loop: Loop) -> Heard:
         """Plants that have not moved yet."""
@@ -59,23 +50,22 @@ class Hearing:
         positions = np.empty((loop.substeps, 2, loop.n))
         if self._plain:
             loop.run(positions=positions)
-            asked = loop.u.copy()
-            return Heard(positions, positions.copy(), asked, asked.copy(), {})
+            return positions, positions.copy(), loop.u, loop.u, {}
         readings = np.empty((loop.substeps, 6, loop.n))
         loop.run(positions=positions, readings=readings)
         return self._told(loop, positions, readings)
 
     def _told(self, loop: Loop, positions: Array, readings: Array) -> Heard:
-        task, asked, forces = self._task, loop.u.copy(), readings[:, 2]
-        more = {}
+        asked, more = loop.u, {}
         if self._rubs:
             more["friction"] = loop.own("plant")[FRICTION : FRICTION + 3].copy()
-        if task.disturbance:
+        if self._pushed:
             more["pushes"] = readings[:, 3:5].copy()
-        if task.sensor.jitter > 0.0:
+        if self._stamped:
             more["stamps"] = readings[:, 5].copy()
-        if task.actuator.measured:
-            more["forces"] = forces.copy()
-        samples = positions.copy() if task.sensor.exact else readings[:, :2].copy()
-        force = asked.copy() if task.actuator.ideal else np.cumsum(forces, axis=0)[-1] / len(forces)
-        return Heard(positions, samples, asked, force, more)
+        if self._measured:
+            more["forces"] = readings[:, 2].copy()
+        samples = positions.copy() if self._exact else readings[:, :2].copy()
+        # one after the other: how NumPy's mean sums up depends on n
+        force = asked if self._ideal else np.cumsum(readings[:, 2], axis=0)[-1] / len(readings)
+        return positions, samples, asked, force, more

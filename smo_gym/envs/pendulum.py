@@ -228,15 +228,17 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         return y.copy() if self._desired is None else np.concatenate([y, self._desired.told[k]])
 
     def _info(self, heard: Heard, k: int) -> dict[str, Any]:
+        positions, samples, asked, force, more = heard
         info = {
             "state": self.loop.x[:, 0].copy(),
             "params": self._params.copy(),
-            "asked": heard.asked.item(),
-            "force": heard.force.item(),
-            "positions": heard.positions[..., 0],
-            "samples": heard.samples[..., 0],
-            **{name: values[..., 0] for name, values in heard.more.items()},
+            "asked": asked.item(),
+            "force": force.item(),
+            "positions": positions[:, :, 0],
+            "samples": samples[:, :, 0],
         }
+        if more:
+            info |= {name: values[..., 0] for name, values in more.items()}
         if self._desired is not None:
             info["desired"] = self._desired.positions[k].copy()
         return info

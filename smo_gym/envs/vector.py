@@ -19,7 +19,7 @@ from ..plant import PARAMS
 from ..typing import Array, Flags
 from ..validation import mapping, short, whole
 from .desired import Desired
-from .hearing import Heard, Hearing
+from .hearing import Heard, Hearing, held
 from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .rendering import Renderer, Scene
 from .resetting import instants, marked, seeds_of, slot_by_slot
@@ -78,7 +78,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.loop = loop_of(self.task, num_envs)
-        self._hearing = Hearing(self.task)
+        self._hearing, self._unit = Hearing(self.task), self.task.actuator.unit
         self._desired = None if self.task.reference is None else Desired(self.task, self.task.reference)
         self._renderer: Renderer | None = None  # made with the first frame, which alone needs pygame
         self._force = np.zeros(num_envs)
@@ -137,7 +137,9 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         if self._waiting:
             over = self._terminated | self._truncated
             loop.alive[over] = 0.0
-        loop.u[:] = checked_force(actions, self.num_envs, over) * self.task.actuator.unit
+        loop.u[:] = checked_force(actions, self.num_envs, over)
+        if self._unit != 1.0:
+            loop.u *= self._unit
         self._k += 1 if over is None else ~over
         if self._desired is not None:
             loop.x_d[:] = self._desired.states[self._k].T
@@ -150,7 +152,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
             else:  # the step after the end is the reset (NEXT_STEP)
                 terminated[over] = truncated[over] = False
                 self._start(over, [])
-            heard = heard.held(loop, over)
+            heard = held(heard, loop, over)
         self._terminated, self._truncated = terminated.copy(), truncated.copy()
         info = self._info(heard)
         ended = terminated | truncated
@@ -168,7 +170,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         final_info = {key: only(value, ended) for key, value in final.items()}
         self._start(ended, [])
         return {
-            **self._info(heard.held(self.loop, ended)),
+            **self._info(held(heard, self.loop, ended)),
             "final_obs": final_obs,
             "_final_obs": ended.copy(),
             "final_info": final_info,
@@ -240,19 +242,27 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         return observation
 
     def _info(self, heard: Heard) -> dict[str, Any]:
-        self._force = heard.force
+        positions, samples, asked, force, more = heard
+        everywhere, self._force = self._everywhere, force.copy()
         info = {
             "state": self.loop.x.T.copy(),
+            "_state": everywhere,
             "params": self._params_told,
-            "asked": heard.asked,
+            "_params": everywhere,
+            "asked": asked.copy(),
+            "_asked": everywhere,
             "force": self._force,
-            "positions": heard.positions.transpose(2, 0, 1),
-            "samples": heard.samples.transpose(2, 0, 1),
-            **{name: np.moveaxis(values, -1, 0) for name, values in heard.more.items()},
+            "_force": everywhere,
+            "positions": positions.transpose(2, 0, 1),
+            "_positions": everywhere,
+            "samples": samples.transpose(2, 0, 1),
+            "_samples": everywhere,
         }
+        for name, values in more.items():
+            info |= {name: np.moveaxis(values, -1, 0), f"_{name}": everywhere}
         if self._desired is not None:
-            info["desired"] = self._desired.positions[self._k]
-        return info | {f"_{name}": self._everywhere for name in info}
+            info |= {"desired": self._desired.positions[self._k], "_desired": everywhere}
+        return info
 
 
 def only(values: NDArray[Any], slots: Flags) -> NDArray[Any]:
