@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,25 +15,33 @@ from smo_gym.evaluation.guard import guard
 from smo_gym.evaluation.metrics import USUAL
 from smo_gym.evaluation.scenario import named
 from smo_gym.loop import Loop
-from smo_gym.plant import moving
+from smo_gym.plant import PARAMS
 
 DT = 0.001
 
 
-def closed_loop(controller: str, n: int, control_period: float = DT) -> Loop:
-    """Regulation on n plants with 20 % uncertainty: observer, force limit, guard, metrics and judge."""
+def closed_loop(controller: str, n: int, control_period: float = DT, **options: Any) -> Loop:
+    """Regulation on n plants with 20 % uncertainty: observer, force limit, guard, metrics and judge.
+
+    Args:
+        controller: of the scenario, by name.
+        n: number of plants.
+        control_period: in s.
+        **options: of the environment.
+    """
     scenario = named("regulation").changed(control_period=control_period)
     settings = scenario.controllers[controller]
     env = gymnasium.make_vec(
-        scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **scenario.environment_options
+        scenario.environment, n, autoreset_mode=AutoresetMode.DISABLED, **scenario.environment_options, **options
     )
     inner = loop_inside(VectorObserverWrapper(env, settings.observer.build(True)))
     assert inner is not None
-    params = inner.task.params.as_array()[:, None] * np.ones((4, n))
-    params[:3] *= np.random.default_rng(1).uniform(0.8, 1.2, (3, n))
+    (plant,) = inner.loop.parts["plant"]
+    rows = plant.rows.copy()
+    rows[PARAMS : PARAMS + 3] *= np.random.default_rng(1).uniform(0.8, 1.2, (3, n))
     return inner.loop.with_parts(
         law=settings.build(control_period).part(n),
-        plant=moving(params, DT),
+        plant=replace(plant, rows=rows),
         guard=guard(inner.loop),
         metrics=USUAL.part(n),
     )

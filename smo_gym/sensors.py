@@ -178,7 +178,7 @@ class Sensor:
     def part(self, n: int, dt: float) -> Part:
         """What the sensor puts into a loop of n slots that is sampled every ``dt`` seconds.
 
-        Its row :data:`KEY` is the key of the slot's episode, a whole number in [0, 2^52): random numbers are a
+        Its row ``KEY`` is the key of the slot's episode, a whole number in [0, 2^52): random numbers are a
         function of it, the number of the sample in the episode and the channel alone.
 
         Raises:
