@@ -13,7 +13,7 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,11 +24,12 @@ from .. import files, presets
 from ..article import WITH, WITHOUT
 from ..evaluation import configs, formats, scenario, study
 from ..evaluation.arms import ARMS, EVERY, PRINTED, SMO
+from ..evaluation.between import lines
 from ..evaluation.report import answer, figures, page, tables
 from ..evaluation.statistics import Result, results
 from ..policies import named
 from ..validation import choice, unknown
-from . import computing
+from . import between, computing
 from .answer import show
 from .arguments import Parser, fraction, one_of, positive, several, versions
 from .entry import Stop, command, said, typed
@@ -94,27 +95,13 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         metavar="N",
         help="limit in newtons in place of the scenario's, for all controllers",
     )
-    for name, known in presets.KINDS.items():
-        names = ", ".join(known)
-        add(f"--{name}", type=setting, metavar="NAME", help=f"of the plants: {names}, or fields as YAML")
+    between.add(parser)
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     add("--verbose", action="store_true", help="print every cell of every table too, as in tables.md")
     parser.out("results", "folder for the results")
     computing.add(parser)
     return parser.parse_args(arguments)
-
-
-def setting(text: str) -> Any:
-    """An option's value: a name, or YAML.
-
-    Raises:
-        ValueError: it is no YAML.
-    """
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ValueError(f"{text!r} is neither a name nor YAML: {error}") from None
 
 
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
@@ -129,14 +116,20 @@ def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
         changes["uncertainty"] = tuple(dict.fromkeys(arguments.uncertainty))
     if arguments.force_limit is not None:
         changes["force_limit"] = arguments.force_limit
-    between = {name: value for name in presets.KINDS if (value := getattr(arguments, name)) is not None}
-    if between:
-        given = {name: {"value": value, "source": "chosen", "note": "command line"} for name, value in between.items()}
-        found = [place.changed(options={**place.options, **given}) for place in found]
     changed = [place.changed(note="command line", **changes) for place in found]
-    if between:
-        for place in changed:
-            place.make()  # notices a value that is not allowed
+    options = between.given(arguments)
+    return [_with(place, options) for place in changed] if options else changed
+
+
+def _with(place: scenario.Scenario, options: Mapping[str, Any]) -> scenario.Scenario:
+    """A scenario with further options of the environment.
+
+    Raises:
+        ValueError: one is not allowed.
+    """
+    given = {name: {"value": value, "source": "chosen", "note": "command line"} for name, value in options.items()}
+    changed = place.changed(options={**place.options, **given})
+    changed.make()
     return changed
 
 
@@ -211,17 +204,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise ValueError(f"{error}; nothing was written") from None
         numbers = results(outcomes)
         found = answer.blocks(outcomes, numbers)
-        sentences = answer.words(found)
+        sentences, told = answer.words(found), lines(scenarios)
         written = False
         try:
-            files.write_set(out, contents(args, scenarios, outcomes, numbers, sentences), replaced())
+            files.write_set(out, contents(args, scenarios, outcomes, numbers, sentences, told), replaced())
             written = True
         finally:  # what cannot be written can be read at least
             if args.verbose or not written:
                 print(tables.render(numbers, "simple", rms=False))
                 print(tables.diagnostics(outcomes, "simple"))
                 print(f"\n{formats.paragraph(tables.summary(numbers), 'simple')}\n", flush=True)
-            show(found, sentences)
+            show(found, sentences, told)
         try:
             starts = measure(figures.starts(drawn, groups), args.seed, samples=figures.DENSE)
             draw(out, drawn, outcomes, starts, numbers)
@@ -245,11 +238,14 @@ def contents(
     outcomes: Sequence[study.Outcome],
     numbers: Sequence[Result],
     sentences: Sequence[str],
+    told: Sequence[str],
 ) -> dict[str, str]:
-    """The files of results by name, the settings they come from last."""
-    told = {key: value for key, value in vars(args).items() if key not in UNSAID}
+    """The files of results by name, the settings they come from last; what stands between goes first."""
+    left_out = (*UNSAID, *(name for name in presets.KINDS if getattr(args, name) is None))
+    given = {key: value for key, value in vars(args).items() if key not in left_out}
     resolved = {
-        "command": {key: str(value) if isinstance(value, Path) else value for key, value in told.items()},
+        **({"between": list(told)} if told else {}),
+        "command": {key: str(value) if isinstance(value, Path) else value for key, value in given.items()},
         "versions": versions(),
         "scenarios": [place.model_dump(mode="json") for place in scenarios],
     }
@@ -259,7 +255,8 @@ def contents(
     return {
         "results.csv": tables.results_csv(numbers),
         "runs.csv": tables.runs_csv(outcomes),
-        "tables.md": tables.render(numbers, "github", rms=True)
+        "tables.md": "".join(f"{formats.markdown(text)}\n\n" for text in told)
+        + tables.render(numbers, "github", rms=True)
         + f"\n## Diagnostics\n\n{notes}\n\n## In words\n\n{said_of_all}\n",
         "tables.tex": tables.render(numbers, "latex_booktabs", rms=True),
         **({"reference.json": followed[-1].to_json() + "\n"} if followed else {}),

@@ -44,7 +44,7 @@ class Hearing:
 
     def __init__(self, task: Task) -> None:
         self._task = task
-        self._plain = task.ideal and task.sensor.exact
+        self._plain = task.exact
         self._rubs = bool(task.rubs)
 
     def still(self, loop: Loop) -> Heard:

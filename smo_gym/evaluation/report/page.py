@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import files
-from .. import formats
+from .. import between, formats
 from ..arms import ARMS
 from ..statistics import Result, place
 from ..study import Group, Outcome
@@ -93,6 +93,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         figures=Markup(_json(figures)),
         effects=page_numbers.effects(outcomes, results),
         score=page_numbers.score(results),
+        between=between.lines(outcome.group.scenario for outcome in outcomes),
         summary=tables.summary(results),
         runs=sum(len(outcome.failed) for outcome in outcomes),
         failed=sum(int(outcome.failed.sum()) for outcome in outcomes),
