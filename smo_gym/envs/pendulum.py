@@ -19,7 +19,7 @@ from .desired import Desired
 from .hearing import Heard, Hearing
 from .rendering import MODES, Renderer, Scene
 from .spec import Specified
-from .stepping import begin, loop_of
+from .stepping import begin, complain, loop_of
 from .task import HANGING, TRACKING, UPRIGHT, Task
 
 RESET_OPTIONS = ("state", "params", "noise")
@@ -183,6 +183,7 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         truncated = self._steps_left == 0 and not terminated
         if terminated:
             self._steps_left = 0
+            complain(loop, loop.failed > 0.0)
         info = self._info(heard, k)
         self._see(k, info["force"])
         return self._observation(k), loop.reward.item(), terminated, truncated, info

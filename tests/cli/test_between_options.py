@@ -96,3 +96,21 @@ def test_a_line_that_holds_for_some_tables_names_them(small):
     outcomes = study.measure(study.groups(places, ["lqr"], ["with"], 1), seed=0)
     published = {r.cell.table for r in statistics.results(outcomes) if r.published > 0.0}
     assert published == {"4"}
+
+
+@pytest.mark.parametrize("controller", ["lqr", "who_asks:Agent"])
+def test_a_disturbance_that_is_not_finite_is_named(command, tmp_path, monkeypatch, controller):
+    (tmp_path / "not_finite.py").write_text(
+        "import math\n\n\ndef push(t, h, theta, v, omega):\n    return (math.nan if t > 0.505 else 0.0), 0.0\n"
+    )
+    (tmp_path / "who_asks.py").write_text(
+        "class Agent:\n    def predict(self, observation, state=None, episode_start=None, deterministic=True):\n"
+        "        return 0.0 * observation[:, :1], None\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    options = ("--config", SMALL, "--runs", "1", "--uncertainty", "0.1", "--compensation", "on", "--out", tmp_path)
+    monkeypatch.setattr("gymnasium.logger.min_level", 40)
+    done = command("evaluate", "--controller", controller, "--disturbance", "not_finite:push", *options)
+    said = " ".join(done.stdout.split())
+    assert "0 %, with: its disturbance was not finite at t = 0.506 s, and that of 1 other run at some time." in said
+    assert "2 of 2 runs failed" in said
