@@ -195,6 +195,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
                     self._params_told[i, 2],
                     self._force[i],
                     x_d[i],
+                    None if self.task.sensor.exact else self.loop.y[:, i].copy(),
                 ),
                 None if self._ghosts is None else self._ghosts[:, i],
             )
