@@ -11,10 +11,10 @@ from .. import presets
 from ..policies import named
 
 
-def add(parser: argparse.ArgumentParser) -> None:
-    """The options."""
+def add(parser: argparse.ArgumentParser, own: bool = False) -> None:
+    """The options; ``own`` says whether a disturbance may be a function of the user's own."""
     for name, known in presets.KINDS.items():
-        more = ", or module:function of your own" if name == "disturbance" else ""
+        more = ", or module:function of your own" if own and name == "disturbance" else ""
         parser.add_argument(
             f"--{name}",
             type=_setting,
@@ -23,13 +23,18 @@ def add(parser: argparse.ArgumentParser) -> None:
         )
 
 
+def data(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Options of the environment by name, those that are given, as data."""
+    return {name: value for name in presets.KINDS if (value := getattr(arguments, name)) is not None}
+
+
 def given(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Options of the environment by name, those that are given; a function is imported.
+    """The same with a function imported.
 
     Raises:
         ValueError: there is no such function.
     """
-    found = {name: value for name in presets.KINDS if (value := getattr(arguments, name)) is not None}
+    found = data(arguments)
     if isinstance(own := found.get("disturbance"), str) and ":" in own:
         found["disturbance"] = named.own(own)
     return found

@@ -95,7 +95,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         metavar="N",
         help="limit in newtons in place of the scenario's, for all controllers",
     )
-    between.add(parser)
+    between.add(parser, own=True)
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     add("--verbose", action="store_true", help="print every cell of every table too, as in tables.md")
