@@ -21,6 +21,7 @@ HEADER = (
     *("\ntable", *(f"{of}\n{kind}" for of in ("MSE of h", "of theta") for kind in ("published", "measured"))),
     *("cells\nin 10 %", "ten runs\nat best", "effort,\nN^2 s"),
 )
+FEW_RUNS = "What ten runs would meet at best takes more than ten runs a cell to tell: --runs 100 shows it."
 _GOOD, _BAD, _HEAD, _COST = "green", "red", "bold", "yellow"
 
 
@@ -43,7 +44,9 @@ def show(found: Sequence[Block], sentences: Sequence[str], between: Sequence[str
     _say(console, between)
     console.print(COMPARED if any(block.reductions for block in found) else AVERAGES, style=_HEAD)
     console.print(table)
-    _say(console, sentences)
+    cells = [block.cells for block in found if block.cells.count]
+    few_runs = bool(cells) and not any(math.isfinite(each.ceiling) for each in cells)
+    _say(console, [*sentences, *[FEW_RUNS] * few_runs])
     console.file.flush()
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from .. import verdicts
 from ..statistics import Result
 from ..study import Outcome
-from .tables import REDUCTION, by_table, title, within
+from .tables import REDUCTION, by_table, ceiling, compared, title, within
 
 STATES = ("h", "theta")
 
@@ -38,8 +38,8 @@ class Cells:
     @classmethod
     def of(cls, rows: Iterable[Result]) -> Cells:
         """Counted in some results."""
-        compared = [r for r in rows if r.cell.metric == "mse" and not r.cell.is_average and r.published > 0.0]
-        return cls(sum(map(within, compared)), len(compared), sum((row.ceiling for row in compared), 0.0))
+        cells = compared(rows)
+        return cls(sum(map(within, cells)), len(cells), ceiling(cells))
 
     @property
     def few(self) -> bool:
@@ -193,15 +193,15 @@ def _span(ends: Sequence[str]) -> str:
 
 def _published(found: Sequence[Block]) -> str:
     """How many published cells are met, and which table is not reproduced."""
-    compared = [block for block in found if block.cells.count]
-    if not compared:
+    blocks = [block for block in found if block.cells.count]
+    if not blocks:
         return "Nothing is published for these runs to compare with."
-    near, count = (sum(getattr(block.cells, name) for block in compared) for name in ("near", "count"))
-    ceiling = sum(block.cells.ceiling for block in compared)
+    near, count = (sum(getattr(block.cells, name) for block in blocks) for name in ("near", "count"))
+    ceilings = [block.cells.ceiling for block in blocks if math.isfinite(block.cells.ceiling)]
     text = f"Within 10 % of the published are {near} of {count} MSE cells"
-    if math.isfinite(ceiling):
-        text += f", where ten runs with every setting exact would bring {ceiling:.1f}"
-    missed = [f"{block.name} ({block.cells.near} of {block.cells.count})" for block in compared if block.cells.few]
+    if ceilings:
+        text += f", where ten runs with every setting exact would bring {sum(ceilings):.1f}"
+    missed = [f"{block.name} ({block.cells.near} of {block.cells.count})" for block in blocks if block.cells.few]
     return f"{text}." + (f" Not reproduced, with fewer than half: Table {'; Table '.join(missed)}." if missed else "")
 
 
