@@ -16,16 +16,7 @@ from .arguments import Parser
 from .entry import command
 
 TITLE = "The article's numbers beside what its own cells give: RMS in m and rad, reductions in percent."
-HEADER = (
-    "table",
-    "controller",
-    "row",
-    "quantity",
-    "printed",
-    "from cells",
-    "mean of reductions",
-    "agrees",
-)
+HEADER = ("table, controller, row", "quantity", "printed", "from cells", "mean of reductions", "agrees")
 
 
 @command("consistency")
@@ -50,8 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(f"{TITLE}\n\n{narrow.table(HEADER, rows)}\n")
     counts = Counter(check.agrees for check in found)
     others = "".join(f", {count} {how}" for how, count in counts.items() if how not in ("yes", "no"))
-    told = (
-        f"{counts['yes']} of {len(found)} printed numbers follow from the printed cells{others}; {counts['no']} do not."
-    )
+    follow = f"{counts['yes']} of {len(found)} printed numbers follow from the printed cells"
+    told = f"{follow}{others}, {counts['no']} by neither."
     print(narrow.paragraph(told))
     return 0

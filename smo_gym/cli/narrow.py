@@ -36,3 +36,20 @@ def paragraph(text: str) -> str:
 
 def _width(text: str) -> int:
     return max(map(len, text.splitlines()), default=0)
+
+
+class Told:
+    """Text that is told line by line: whole for a file, narrow for a console."""
+
+    def __init__(self) -> None:
+        self.whole, self.shown = "", ""
+
+    def say(self, text: str) -> None:
+        """A paragraph or several lines."""
+        self.whole += f"{text}\n"
+        self.shown += "\n".join(map(paragraph, text.split("\n"))) + "\n"
+
+    def table(self, header: Sequence[str], rows: Sequence[Sequence[str]], end: str = "\n") -> None:
+        """A table, and what follows it."""
+        self.whole += tabulate(rows, header, disable_numparse=True) + end
+        self.shown += table(header, rows) + end.lstrip(" ")

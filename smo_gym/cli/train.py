@@ -22,7 +22,7 @@ from tqdm import tqdm
 from .. import files
 from ..evaluation import configs
 from ..wrappers.view import KINDS
-from . import between, starting
+from . import between, narrow, starting
 from .arguments import Parser, fraction, versions, whole
 from .entry import Stop, command, typed
 
@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Train; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     args, out = parse(arguments), None
     try:
-        from ..learning import settings, training
+        from ..learning import measurement, settings, training
 
         of_policy = (args.env, args.algo, args.observation, args.seed, args.steps)
         run = settings.load(args.config, *of_policy, args.uncertainty, between.data(args))
@@ -89,7 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     measured = policy.card.measured
     print(f"While learning, on {measured['runs']} plants that learning does not see:\n")
     print(tabulate(curve, list(COLUMNS.values()), floatfmt=".4g"))
-    print(f"\nThe best of them, on others: {in_words(measured)}")
+    print("\n" + narrow.paragraph(f"The best of them, on others: {in_words(measured)}"))
+    beside = measurement.measure_lqr(policy.card, int(measured["runs"]))
+    if beside is not None:
+        print(narrow.paragraph(f"LQR on the same plants, on SMO estimates, as often: {in_words(beside)}"))
     print(f"The policy is {out / 'policy.safetensors'}. To watch it:\n")
     print(f"    {starting.line('watch')} {shlex.quote(str(out))}")
     return 0

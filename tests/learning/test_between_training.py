@@ -44,3 +44,13 @@ def test_a_training_keeps_what_stands_between_and_does_not_go_on_without_it(comm
 def test_a_bad_value_is_named_before_training(command, capsys, given, said):
     assert command(*given) == 2
     assert said in capsys.readouterr().err
+
+
+def test_lqr_stands_beside_a_policy_on_its_test_plants(command, tmp_path, capsys):
+    assert command() == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    card = MlpPolicy.load(tmp_path / "run/policy.safetensors").card
+    beside = measurement.measure_lqr(card, 5)
+    assert f"LQR on the same plants, on SMO estimates, as often: {train.in_words(beside)}" in shown
+    assert beside["runs"] == card.measured["runs"]
+    assert measurement.measure_lqr(card.model_copy(update={"environment": "of-another-kind"}), 5) is None
