@@ -84,6 +84,14 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
     torque in N m; with jitter, `stamps` (substeps,), how much later in s a sample was taken than it should; with a
     force that is measured, `forces` (substeps,).
 
+    ## Sensors, Actuators, Friction, Disturbances
+
+    By default, in all three environments, the encoders are exact, the force reaches the cart as it was asked for,
+    nothing rubs and nothing else pushes: the article's setting. Each of the options `sensor`, `actuator`, `friction`
+    and `disturbance` changes one of these; `smo-gym presets` lists names for them. Observation and `samples` are then
+    what the sensors say, while `state`, `positions` and the end of an episode are of the truth; rewards weigh the true
+    state and the force that was asked for. With an actuator's `unit` actions are in that unit.
+
     ## Arguments
 
     | Argument | Default | Meaning |

@@ -27,6 +27,7 @@ SECTIONS = (
     "rewards",
     "starting-state",
     "episode-end",
+    "sensors-actuators-friction-disturbances",
     "arguments",
     "version-history",
 )

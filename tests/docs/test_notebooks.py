@@ -40,8 +40,9 @@ def told(notebook):
             yield output.get("text") or data.get("text/markdown") or ("image/png" in data)
 
 
-def test_there_are_three():
-    assert [path.stem for path in NOTEBOOKS] == ["01-the-article", "02-the-observer", "03-learning"]
+def test_there_are_four():
+    names = ["01-the-article", "02-the-observer", "03-learning", "04-what-an-encoder-does"]
+    assert [path.stem for path in NOTEBOOKS] == names
 
 
 @pytest.mark.slow
