@@ -108,17 +108,16 @@ def _of_law(law: str, rows: Sequence[Row], form: str) -> str:
     lines = [
         (
             row.sensor if row.arm == first else "",
-            row.arm,
+            f"{row.arm}, {row.failed} failed" if row.failed else row.arm,
             *(f"{row.means[name]:.3g}" for name in COLUMNS),
-            str(row.failed),
         )
         for row in rows
     ]
     title = (
-        f"{law.upper()} from Table 4's start, 20 %: RMS errors of the velocities after 2 s, and means over "
-        f"{rows[0].runs} runs\n({robustness.MEANT})"
+        f"{law.upper()} from Table 4's start, 20 %: RMS errors of the velocities after 2 s, means over {rows[0].runs} runs"
+        f"\n{robustness.MEANT}"
     )
-    return _table(title, lines, ("sensor", "estimate", *_SHORT, "failed"), form)
+    return _table(title, lines, ("sensor", "estimate", *_SHORT), form)
 
 
 def _table(title: str, lines: Sequence[Sequence[str]], header: Sequence[str], form: str) -> str:

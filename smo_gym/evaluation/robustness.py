@@ -27,7 +27,7 @@ SENSORS: dict[str, dict[str, tuple[float, float]]] = {
     "5 mrad": {"noise": (1e-3, 5e-3)},
 }
 """Sensors of the table, by what they are called there, all chosen."""
-MEANT = "encoders: counts of 0.1 mm and 4096 a turn; 1 mrad: noise of 0.2 mm and 1 mrad; 5 mrad: of 1 mm and 5 mrad"
+MEANT = "(encoders: 0.1 mm, 4096 counts a turn; 1 mrad: noise of 0.2 mm, 1 mrad; 5 mrad: 1 mm, 5 mrad)"
 UNCERTAINTY = 0.2
 SETTLED = 2000
 """Control periods before the errors of a velocity count: 2 s at the article's 1 ms."""

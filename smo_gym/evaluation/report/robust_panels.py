@@ -36,12 +36,14 @@ def draw(rows: Sequence[Row], pushes: Sequence[Push]) -> Figure:
             panel.set_yscale("log")
             panel.set_title(title)
             panel.set_xticks(range(len(sensors)), [sensor.replace(" ", "\n", 1) for sensor in sensors], fontsize=7)
-        error.legend(fontsize=7)
+        chatter.legend(fontsize=7)
         held = [arm for arm in ARMS.values() if any(each.arm == arm.name for each in pushes)]
         stood = {each.arm: each.stood for each in pushes}
         newtons = [0.0 if np.isnan(stood[arm.name]) else stood[arm.name] for arm in held]
-        bars = push.bar(range(len(held)), newtons, color=[arm.colour for arm in held])
-        push.bar_label(bars, [f"{value:.3g}" if value else "none" for value in newtons], fontsize=8)
-        push.set_xticks(range(len(held)), [arm.title.replace(" ", "\n", 1) for arm in held], fontsize=7)
+        bars = push.barh(range(len(held)), newtons, color=[arm.colour for arm in held])
+        push.bar_label(bars, [f"{value:.3g}" if value else "none" for value in newtons], fontsize=8, padding=2)
+        push.set_yticks(range(len(held)), [arm.title.replace(" ", "\n", 1) for arm in held], fontsize=7)
+        push.invert_yaxis()
+        push.margins(x=0.15)
         push.set_title("largest push all stand, N")
     return figure
