@@ -118,7 +118,9 @@ def test_options_do_not_shift_the_random_stream():
 def test_information_has_the_same_keys_at_every_step(env_id, make_vec):
     env = gymnasium.make(env_id)
     _, info = env.reset(seed=0)
-    keys = {"state", "params", "force", "samples", "positions"} | ({"desired"} if "Tracking" in env_id else set())
+    keys = {"state", "params", "asked", "force", "samples", "positions"} | (
+        {"desired"} if "Tracking" in env_id else set()
+    )
     assert info.keys() == keys
     for _ in range(5):
         info = env.step(env.action_space.sample())[4]
