@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from conftest import SMALL
 
-from smo_gym import SlidingModeObserver, VectorObserverWrapper
+from smo_gym import ObserverWrapper, VectorObserverWrapper
 from smo_gym.cli import evaluate
 from smo_gym.evaluation import metrics, scenario, study
 from smo_gym.evaluation.report import tables
@@ -82,27 +82,27 @@ def test_a_compiled_observer_gives_an_estimator_too():
     assert np.abs(estimator.xhat[:2] - y).max() < 0.02
 
 
-def test_noisy_encoders_are_what_the_observer_reads(drivers):
-    exact = run("--observer", "smo")
-    noisy = run("--import", "noisy_encoders", config=config("Noisy-v0"))
-    assert drivers == ["driven", "asked"]
-    for name in ("estimation_rms_h_dot", "mse_h"):
-        assert numbers(noisy, name) != numbers(exact, name)
-    again = run("--import", "noisy_encoders", config=config("Noisy-v0"))
-    assert again == noisy
-    env = gymnasium.make_vec("Noisy-v0", 2)
-    observed = VectorObserverWrapper(env, SlidingModeObserver())
-    assert not observed.plugged
-    _, info = observed.reset(seed=0)
-    assert (info["samples"] != info["positions"]).all()
+def test_a_sensor_of_ones_own_is_what_the_observer_reads(drivers):
+    exact, seen = run(), run("--import", "hall_sensor", config=config("Hall-v0"))
+    assert drivers == ["driven", "driven"]
+    assert numbers(seen, "estimation_rms_theta") != numbers(exact, "estimation_rms_theta")
+    alone, batch = gymnasium.make("Hall-v0"), gymnasium.make_vec("Hall-v0", 3)
+    for env in (ObserverWrapper(alone), VectorObserverWrapper(batch)):
+        _, info = env.reset(seed=0)
+        for _ in range(3):
+            h, theta = np.moveaxis(info["positions"], -1, 0)
+            wanted = theta + 0.01 * np.sin(theta) + 0.02 * np.sin(2.0 * theta)
+            np.testing.assert_allclose(info["samples"][..., 1], wanted, atol=0.5001 * 2.0 * np.pi / 4096)
+            assert np.array_equal(info["samples"][..., 0], h)
+            *_, info = env.step(np.full(env.action_space.shape, 5.0))
 
 
-def test_friction_is_a_part_of_the_loop(drivers):
-    smooth, rubbing = run(), run("--import", "coulomb_friction", config=config("Rubbing-v0"))
+def test_friction_of_ones_own_is_a_part_of_the_loop(drivers):
+    smooth, rubbing = run(), run("--import", "stribeck", config=config("Stribeck-v0"))
     assert drivers == ["driven", "driven"]
     pairs = zip(numbers(smooth, "peak_h_dot"), numbers(rubbing, "peak_h_dot"), strict=True)
     assert all(slower < faster for faster, slower in pairs)
-    alone, batch = gymnasium.make("Rubbing-v0"), gymnasium.make_vec("Rubbing-v0", 3)
+    alone, batch = gymnasium.make("Stribeck-v0"), gymnasium.make_vec("Stribeck-v0", 3)
     alone.reset(seed=0)
     batch.reset(seed=0)
     for _ in range(5):
@@ -111,9 +111,9 @@ def test_friction_is_a_part_of_the_loop(drivers):
 
 
 def test_friction_of_zero_is_the_plant_to_the_bit():
-    importlib.import_module("coulomb_friction")
+    importlib.import_module("stribeck")
     states = []
-    for name, options in (("Rubbing-v0", {"friction": 0.0}), ("SMOPendulum-v0", {})):
+    for name, options in (("Stribeck-v0", {"breakaway": 0.0, "sliding": 0.0}), ("SMOPendulum-v0", {})):
         env = gymnasium.make_vec(name, 3, **options)
         env.reset(seed=0)
         states.append([env.step(np.full((3, 1), 5.0))[4]["state"] for _ in range(5)])
