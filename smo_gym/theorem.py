@@ -77,8 +77,7 @@ class Suprema:
     speed: Array
     """sup |X2| of (28) in m/s and rad/s, (2,)."""
     drift: Array
-    """sup |f20(x) - f20(xhat) + f2Delta(x) + d2(x)| of (30) in m/s^2 and rad/s^2, (2,); d2 is what disturbances and
-    friction add to X2'."""
+    """sup |f20(x) - f20(xhat) + f2Delta(x) + d2| of (30) in m/s^2 and rad/s^2, (2,); d2 is of disturbances."""
     gain: Array
     """sup |g20(x) - g20(xhat) + g2Delta(x)| of (31) in 1/kg and 1/(kg m), (2,)."""
 

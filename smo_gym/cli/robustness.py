@@ -114,8 +114,8 @@ def _of_law(law: str, rows: Sequence[Row], form: str) -> str:
         for row in rows
     ]
     title = (
-        f"{law.upper()} from Table 4's start, 20 %: RMS errors of the velocities after 2 s, means over {rows[0].runs} runs"
-        f"\n{robustness.MEANT}"
+        f"{law.upper()} from Table 4's start, 20 %: RMS errors of the velocities after 2 s, means over "
+        f"{rows[0].runs} runs\n{robustness.MEANT}"
     )
     return _table(title, lines, ("sensor", "estimate", *_SHORT), form)
 
