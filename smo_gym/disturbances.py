@@ -17,7 +17,7 @@ from numba.core.errors import NumbaError
 from .kernels import COMPILES, plain, pushing
 from .kernels.noise import STREAMS, uniforms
 from .kernels.pushing import KINDS, Function
-from .loop import Part, Slots, columns
+from .loop import Loop, Part, Slots, columns
 from .typing import Array
 from .validation import choice, mapping, number, shape_of, short
 
@@ -191,6 +191,11 @@ def begin(own: Array, slots: Slots, disturbances: Sequence[Disturbance], keys: A
         for row, name, u in zip(rows, DRAWN, drawn, strict=True):
             low, high = each.ends(name)
             own[pushing.FIRST + d * pushing.GROUP + row, slots] = low + (high - low) * u
+
+
+def refused(loop: Loop) -> Array:
+    """When in s the sum was not finite in each slot of a loop, (n,); 0 where it always has been."""
+    return loop.own("disturbance")[pushing.REFUSED].copy() if "disturbance" in loop.parts else np.zeros(loop.n)
 
 
 def _drawn(name: str, value: Any) -> Drawn:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Generic, TypeVar
 
 from .actuators import Actuator
 from .disturbances import Disturbance
 from .friction import Friction
+from .kernels import plain
 from .sensors import Sensor
 from .validation import choice
 
@@ -178,3 +179,28 @@ def disturbance(value: Any) -> tuple[Disturbance, ...]:
     if isinstance(value, str):
         return DISTURBANCES[choice("disturbance", value, DISTURBANCES)].settings
     return Disturbance.of(value)
+
+
+def said(settings: Any, whole: bool = False) -> str:
+    """Settings by field: all, or those that are not the default."""
+    if isinstance(settings, tuple):
+        return "; ".join(said(each, whole) for each in settings)
+    usual = type(settings)()
+    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    return ", ".join(
+        f"{name}={_short(value)}" for name, value in values.items() if whole or value != getattr(usual, name)
+    )
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_short, value))})"
+    if callable(value):
+        return spelled(value)
+    return f"{value:.5g}" if isinstance(value, float) else repr(value)
+
+
+def spelled(function: Any) -> str:
+    """A function as module:function."""
+    inner = plain(function)
+    return f"{inner.__module__}:{inner.__qualname__}"

@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .controllers import SlidingModeController
+from .friction import Friction
+from .kernels import plain
+from .kernels.cart_pendulum import answer
 from .observers import Gains, SlidingModeObserver
 from .plant import CartPendulum
 from .typing import Array, Flags
@@ -30,9 +33,13 @@ class OperatingSet:
         speed_hat: bounds of the estimates of these; they overshoot while the positions are still being reached.
         uncertainty: level x of the plants.
         model: nominal plant.
+        push: bound of a matched disturbance in N.
+        torque: bound of a disturbing torque about the pivot in N m.
+        friction: of the plants, of which an observer knows nothing.
 
     Raises:
-        ValueError: a bound is not positive or the level not in [0, 1): the set would hold no point.
+        ValueError: a bound is not positive or the level not in [0, 1): the set would hold no point; or the bound of a
+            disturbance is negative.
     """
 
     theta: float
@@ -40,6 +47,9 @@ class OperatingSet:
     speed_hat: tuple[float, float]
     uncertainty: float
     model: CartPendulum = field(default_factory=CartPendulum)
+    push: float = 0.0
+    torque: float = 0.0
+    friction: Friction = field(default_factory=Friction)
 
     def __post_init__(self) -> None:
         number("theta", self.theta, above=0.0)
@@ -48,6 +58,10 @@ class OperatingSet:
                 raise ValueError(f"{name}={getattr(self, name)!r} must be positive: the operating set holds no point")
         if not 0.0 <= number("uncertainty", self.uncertainty) < 1.0:
             raise ValueError(f"uncertainty={self.uncertainty!r} must be a fraction in [0, 1)")
+
+        for name in ("push", "torque"):
+            if number(name, getattr(self, name)) < 0.0:
+                raise ValueError(f"{name}={getattr(self, name)!r} must be at least 0")
 
     def holds(self, x: Array, xhat: Array) -> Flags:
         """Which pairs of states (4, ...) and estimates (4, ...) are inside, (...)."""
@@ -63,7 +77,7 @@ class Suprema:
     speed: Array
     """sup |X2| of (28) in m/s and rad/s, (2,)."""
     drift: Array
-    """sup |f20(x) - f20(xhat) + f2Delta(x)| of (30) in m/s^2 and rad/s^2, (2,)."""
+    """sup |f20(x) - f20(xhat) + f2Delta(x) + d2| of (30) in m/s^2 and rad/s^2, (2,); d2 is of disturbances."""
     gain: Array
     """sup |g20(x) - g20(xhat) + g2Delta(x)| of (31) in 1/kg and 1/(kg m), (2,)."""
 
@@ -73,20 +87,40 @@ def suprema(over: OperatingSet) -> Suprema:
 
     f2 and g2 are affine in theta'^2 and, one at a time, monotone in M_c, m and l (each is a Moebius function of them),
     so extremes lie at the corners of those; theta is scanned.
+
+    The article's model has no disturbance. With a force d and a torque tau, and friction of which the observer knows
+    nothing, X2' has d2 = M^-1 [d - c h' - F_c sgn h', tau - b theta'] more, M the mass matrix. Its supremum, with each
+    term at its bound and of the worse sign, adds to that of (30): then Theorem 1 is as before.
     """
     f, g = _corners(over.theta, over.speed[1], _plants(over))
     fhat, ghat = _corners(over.theta, over.speed_hat[1], [over.model])
     return Suprema(
         speed=np.array(over.speed),
-        drift=np.maximum(f.max(axis=1) - fhat.min(axis=1), fhat.max(axis=1) - f.min(axis=1)),
+        drift=np.maximum(f.max(axis=1) - fhat.min(axis=1), fhat.max(axis=1) - f.min(axis=1)) + disturbed(over),
         gain=np.maximum(g.max(axis=1) - ghat.min(axis=1), ghat.max(axis=1) - g.min(axis=1)),
     )
+
+
+def disturbed(over: OperatingSet) -> Array:
+    """The supremum of |d2|, what disturbances and friction add to X2', one entry a row (see :func:`suprema`)."""
+    c, coulomb, b = over.friction.as_array()
+    force, torque = over.push + coulomb + c * over.speed[0], over.torque + b * over.speed[1]
+    theta = np.linspace(-over.theta, over.theta, 4001)
+    x = np.array([np.zeros_like(theta), theta, np.zeros_like(theta), np.zeros_like(theta)])
+    largest = np.zeros(2)
+    for plant in _plants(over):
+        M_c, m, l, _ = plant.as_array()
+        g_h, g_theta = plant.gain(x)[2:]
+        from_force = np.abs(plain(answer)(g_h, g_theta, force, 0.0, M_c, m, l))
+        from_torque = np.abs(plain(answer)(g_h, g_theta, 0.0, torque, M_c, m, l))
+        largest = np.maximum(largest, (from_force + from_torque).max(axis=1))
+    return largest
 
 
 def acceleration(over: OperatingSet, force: float) -> Array:
     """The supremum of |X2'| = |f2(x) + g2(x) u| over an operating set while |u| <= force, one entry a row."""
     f, g = _corners(over.theta, over.speed[1], _plants(over))
-    return np.asarray((np.abs(f) + np.abs(g) * force).max(axis=1))
+    return np.asarray((np.abs(f) + np.abs(g) * force).max(axis=1)) + disturbed(over)
 
 
 def _plants(over: OperatingSet) -> list[CartPendulum]:

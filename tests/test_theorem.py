@@ -172,7 +172,11 @@ def test_margins_are_positive():
 
 @pytest.mark.slow
 def test_the_command(command, tmp_path):
-    text = command("theorem", "--runs", "30").stdout
+    shown = command("theorem", "--runs", "30", "--out", tmp_path).stdout
+    assert max(map(len, shown.splitlines()[:-1])) <= 100
+    assert "designed, 3 of 3. RMS errors" in " ".join(shown.split())
+    assert shown.endswith(f"theorem.txt is in {tmp_path}\n")
+    text = (tmp_path / "theorem.txt").read_text()
     assert "30 of 30 were inside the layer of both positions by the time of (43)" in text
     assert "30 of 30 kept |e| <= atanh((V + kappa) / m1) / k_p from |e(0)| / kappa on, kappa = 0.5" in text
     assert "In the end |X2 - X2hat| is at most (0.0215, 0.239) m/s, rad/s" in text

@@ -12,6 +12,7 @@ from ..evaluation.report.answer import Block, Cells, Pair
 from .console import screen
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.text import Text
 
 COMPARED = "Each table: what the compensation changes; below it, averages over the rows."
@@ -20,11 +21,12 @@ HEADER = (
     *("\ntable", *(f"{of}\n{kind}" for of in ("MSE of h", "of theta") for kind in ("published", "measured"))),
     *("cells\nin 10 %", "ten runs\nat best", "effort,\nN^2 s"),
 )
+FEW_RUNS = "What ten runs would meet at best takes more than ten runs a cell to tell: --runs 100 shows it."
 _GOOD, _BAD, _HEAD, _COST = "green", "red", "bold", "yellow"
 
 
-def show(found: Sequence[Block], sentences: Sequence[str]) -> None:
-    """Print the blocks as one table, of the columns that are not empty, and the sentences."""
+def show(found: Sequence[Block], sentences: Sequence[str], between: Sequence[str] = ()) -> None:
+    """Print what stands between, the blocks as one table of the columns that are not empty, and the sentences."""
     from rich.box import Box
     from rich.table import Table
 
@@ -39,11 +41,18 @@ def show(found: Sequence[Block], sentences: Sequence[str]) -> None:
         table.add_column(HEADER[i], justify="right" if right else "left", no_wrap=right, overflow="fold")
     for row in rows:
         table.add_row(*(row[i] for i in filled))
+    _say(console, between)
     console.print(COMPARED if any(block.reductions for block in found) else AVERAGES, style=_HEAD)
     console.print(table)
+    cells = [block.cells for block in found if block.cells.count]
+    few_runs = bool(cells) and not any(math.isfinite(each.ceiling) for each in cells)
+    _say(console, [*sentences, *[FEW_RUNS] * few_runs])
+    console.file.flush()
+
+
+def _say(console: Console, sentences: Sequence[str]) -> None:
     for text in sentences:
         console.print(textwrap.fill(formats.line(text), console.width, break_on_hyphens=False), soft_wrap=True)
-    console.file.flush()
 
 
 def _rows(block: Block) -> list[tuple[Text, ...]]:

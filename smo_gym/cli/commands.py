@@ -16,6 +16,7 @@ COMMANDS = {
     "train": "train a policy with PPO on what an agent can know",
     "theorem": "the theorem's conditions, designed gains and promised times",
     "upright": "how often the upright plant falls",
+    "robustness": "real encoders, and the largest push that the upright plant stands",
     "consistency": "the article's averages and reductions against its own cells",
     "identify": "recover what the article does not print",
     "reference": "the minimum-energy reference of the tracking scenario",

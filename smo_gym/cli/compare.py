@@ -19,7 +19,7 @@ from tqdm import tqdm
 from .. import files
 from ..evaluation import configs, formats, scenario
 from ..learning import contest
-from . import computing
+from . import computing, narrow
 from .arguments import Parser, positive
 from .entry import command
 from .progress import simulated
@@ -105,9 +105,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         try:
             files.write_set(out, dict(zip(RESULTS, texts, strict=True)))
         finally:  # what cannot be written can be read at least
-            print(contest_table.render(rows, levels, "simple"))
-            print(words(answers, "simple"))
-    print(f"\nresults are in {out}")
+            print(narrow.paragraph(told))
+            for header, lines in contest_table.tables(rows, levels):
+                print(f"\n{narrow.table(header, lines)}")
+            print("\n".join(map(narrow.paragraph, words(answers, "simple").splitlines())))
+    print(f"\n{', '.join(RESULTS)} are in {out}")
     return 0
 
 

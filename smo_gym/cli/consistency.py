@@ -7,26 +7,16 @@ smo-gym consistency --all    # everything
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
-from tabulate import tabulate
-
 from ..article.consistency import checks
+from . import narrow
 from .arguments import Parser
 from .entry import command
 
-HEADER = (
-    "table",
-    "controller",
-    "row",
-    "quantity",
-    "",
-    "compensation",
-    "printed",
-    "from cells",
-    "mean of reductions",
-    "agrees",
-)
+TITLE = "The article's numbers beside what its own cells give: RMS in m and rad, reductions in percent."
+HEADER = ("table, controller, row", "quantity", "printed", "from cells", "mean of reductions", "agrees")
 
 
 @command("consistency")
@@ -38,7 +28,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     found = checks()
     rows = [
         (
-            *(check.table, check.controller, check.row, check.quantity, check.state, check.compensation),
+            ", ".join(filter(None, (check.table, check.controller, check.row))),
+            ", ".join(filter(None, (check.quantity, check.state, check.compensation))),
             f"{check.printed:.6g}",
             f"{check.recomputed:.6g}",
             "" if math.isnan(check.alternative) else f"{check.alternative:.4g}",
@@ -47,7 +38,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for check in found
         if args.all or check.agrees != "yes"
     ]
-    print(tabulate(rows, HEADER, disable_numparse=True))
-    agreeing = sum(check.agrees == "yes" for check in found)
-    print(f"\n{agreeing} of {len(found)} printed numbers follow from the printed cells.")
+    print(f"{TITLE}\n\n{narrow.table(HEADER, rows)}\n")
+    counts = Counter(check.agrees for check in found)
+    others = "".join(f", {count} {how}" for how, count in counts.items() if how not in ("yes", "no"))
+    follow = f"{counts['yes']} of {len(found)} printed numbers follow from the printed cells"
+    told = f"{follow}{others}, {counts['no']} by neither."
+    print(narrow.paragraph(told))
     return 0

@@ -24,11 +24,12 @@ from .. import files, presets
 from ..article import WITH, WITHOUT
 from ..evaluation import configs, formats, scenario, study
 from ..evaluation.arms import ARMS, EVERY, PRINTED, SMO
+from ..evaluation.between import lines
 from ..evaluation.report import answer, figures, page, tables
 from ..evaluation.statistics import Result, results
 from ..policies import named
 from ..validation import choice, unknown
-from . import computing
+from . import between, computing
 from .answer import show
 from .arguments import Parser, fraction, one_of, positive, several, versions
 from .entry import Stop, command, said, typed
@@ -94,29 +95,13 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         metavar="N",
         help="limit in newtons in place of the scenario's, for all controllers",
     )
-    for name, known in presets.KINDS.items():
-        names = ", ".join(known)
-        add(f"--{name}", type=setting, metavar="NAME", help=f"of the plants: {names}, or fields as YAML")
+    between.add(parser, own=True)
     add("--figures", action="store_true", help="draw the article's Figures 3-17 from these runs into DIR/figures")
     add("--report", type=Path, metavar="FILE", help="write tables, plots and runs that play into one HTML file")
     add("--verbose", action="store_true", help="print every cell of every table too, as in tables.md")
     parser.out("results", "folder for the results")
     computing.add(parser)
     return parser.parse_args(arguments)
-
-
-def setting(text: str) -> Any:
-    """An option's value: a name, or YAML.
-
-    Raises:
-        argparse.ArgumentTypeError: it is no YAML.
-    """
-    try:
-        return yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is neither a name nor YAML: {files.shortened(str(error))}"
-        ) from None
 
 
 def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
@@ -131,8 +116,8 @@ def load(arguments: argparse.Namespace) -> list[scenario.Scenario]:
         changes["uncertainty"] = tuple(dict.fromkeys(arguments.uncertainty))
     if arguments.force_limit is not None:
         changes["force_limit"] = arguments.force_limit
-    between = {name: value for name in presets.KINDS if (value := getattr(arguments, name)) is not None}
-    chosen = [place.with_options("command line", **between) for place in found] if between else found
+    options = between.given(arguments)
+    chosen = [place.with_options("command line", **options) for place in found] if options else found
     return [place.changed(note="command line", **changes) for place in chosen]
 
 
@@ -207,17 +192,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise ValueError(f"{error}; nothing was written") from None
         numbers = results(outcomes)
         found = answer.blocks(outcomes, numbers)
-        sentences = answer.words(found)
+        sentences, told = answer.words(found), lines(scenarios)
         written = False
         try:
-            files.write_set(out, contents(args, scenarios, outcomes, numbers, sentences), replaced())
+            files.write_set(out, contents(args, scenarios, outcomes, numbers, sentences, told), replaced())
             written = True
         finally:  # what cannot be written can be read at least
             if args.verbose or not written:
                 print(tables.render(numbers, "simple", rms=False))
                 print(tables.diagnostics(outcomes, "simple"))
                 print(f"\n{formats.paragraph(tables.summary(numbers), 'simple')}\n", flush=True)
-            show(found, sentences)
+            show(found, sentences, told)
         try:
             starts = measure(figures.starts(drawn, groups), args.seed, samples=figures.DENSE)
             draw(out, drawn, outcomes, starts, numbers)
@@ -241,11 +226,14 @@ def contents(
     outcomes: Sequence[study.Outcome],
     numbers: Sequence[Result],
     sentences: Sequence[str],
+    told: Sequence[str],
 ) -> dict[str, str]:
-    """The files of results by name, the settings they come from last."""
-    told = {key: value for key, value in vars(args).items() if key not in UNSAID}
+    """The files of results by name, the settings they come from last; what stands between goes first."""
+    left_out = (*UNSAID, *(name for name in presets.KINDS if getattr(args, name) is None))
+    given = {key: value for key, value in vars(args).items() if key not in left_out}
     resolved = {
-        "command": {key: str(value) if isinstance(value, Path) else value for key, value in told.items()},
+        **({"between": list(told)} if told else {}),
+        "command": {key: str(value) if isinstance(value, Path) else value for key, value in given.items()},
         "versions": versions(),
         "scenarios": [place.model_dump(mode="json") for place in scenarios],
     }
@@ -255,7 +243,8 @@ def contents(
     return {
         "results.csv": tables.results_csv(numbers),
         "runs.csv": tables.runs_csv(outcomes),
-        "tables.md": tables.render(numbers, "github", rms=True)
+        "tables.md": "".join(f"{formats.markdown(text)}\n\n" for text in told)
+        + tables.render(numbers, "github", rms=True)
         + f"\n## Diagnostics\n\n{notes}\n\n## In words\n\n{said_of_all}\n",
         "tables.tex": tables.render(numbers, "latex_booktabs", rms=True),
         **({"reference.json": followed[-1].to_json() + "\n"} if followed else {}),

@@ -7,10 +7,9 @@ smo-gym presets sensor cart-pole   # one, every field of it
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
-from ..presets import KINDS, Preset
+from ..presets import KINDS, Preset, said
 from ..validation import choice
 from .arguments import Parser, one_of
 from .console import screen
@@ -45,20 +44,3 @@ def _show(kinds: Mapping[str, Mapping[str, Preset[Any]]], name: str | None) -> N
             console.print(Padding(told, (0, 0, 0, 4)))
             console.print(Padding(preset.source, (0, 0, 0, 4)), style="dim")
     console.file.flush()
-
-
-def said(settings: Any, whole: bool = False) -> str:
-    """Settings by field: all, or those that are not the default."""
-    if isinstance(settings, tuple):
-        return "; ".join(said(each, whole) for each in settings)
-    usual = type(settings)()
-    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
-    return ", ".join(
-        f"{name}={_short(value)}" for name, value in values.items() if whole or value != getattr(usual, name)
-    )
-
-
-def _short(value: Any) -> str:
-    if isinstance(value, tuple):
-        return f"({', '.join(map(_short, value))})"
-    return f"{value:.5g}" if isinstance(value, float) else repr(value)

@@ -10,7 +10,6 @@ settings file (--config) to see those of your own beside them.
 from __future__ import annotations
 
 import contextlib
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,7 +17,6 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from scipy import stats
-from tabulate import tabulate
 from tqdm import tqdm
 
 from .. import (
@@ -36,8 +34,10 @@ from ..evaluation.scenario import Scenario, TheoremSettings
 from ..evaluation.theorem_on_runs import SHARES, Convergence
 from ..evaluation.theorem_pieces import converge_in_pieces
 from ..evaluation.traces import Traces
+from . import narrow
 from .arguments import Parser
 from .entry import command
+from .narrow import Told
 
 DT = 0.001
 RESULT = "theorem.txt"
@@ -57,37 +57,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     over = settings.over(CartPendulum())
     observer = settings.build(DT, over.model)
     with contextlib.nullcontext() if args.out is None else files.claimed(args.out, [RESULT]) as out:
-        said_all = io.StringIO()
-        with store.kept(out) if out else contextlib.nullcontext() as kept, contextlib.redirect_stdout(said_all):
-            parts(settings, over, observer, args.runs, args.seed, kept)
+        told = Told()
+        with store.kept(out) if out else contextlib.nullcontext() as kept:
+            answer = parts(told, settings, over, observer, args.runs, args.seed, kept)
         try:
             if out is not None:
-                files.write(out / RESULT, said_all.getvalue())
+                files.write(out / RESULT, told.whole)
         finally:  # what cannot be written can be read at least
-            print(said_all.getvalue(), end="")
+            print(f"{told.shown}\n{narrow.paragraph(answer)}")
+        if out is not None:
+            print(f"{RESULT} is in {out}")
     return 0
 
 
 def parts(
+    told: Told,
     settings: TheoremSettings,
     over: theorem.OperatingSet,
     observer: SlidingModeObserver,
     count: int,
     seed: int,
     kept: store.Store | None,
-) -> None:
-    """Print the three parts."""
+) -> str:
+    """Tell the three parts, and the answer in a sentence."""
     article = scenario.named("initial-conditions")
     gains = {"printed, LQR": Gains.of("lqr"), "printed, SMC": Gains.of("smc"), "designed": Gains.of(observer.gains)}
     if settings.gains is not None:
         gains["your own"] = Gains.of(settings.gains.value)
-    gain_conditions(gains, over)
+    gain_conditions(told, gains, over)
     epsilon_1, epsilon_2 = theorem.initial_errors(settings.starts.value, observer.xhat0)
-    print(
+    told.say(
         f"\nOver the box of starts (36) and (37) hold for epsilon_1 > ({pair(epsilon_1)}) and epsilon_2 > "
         f"({pair(epsilon_2)})."
     )
-    print(
+    told.say(
         f"The designed observer wants a step of {1e3 * (observer.step or DT):.3g} ms with slopes {observer.slopes}.\n"
     )
     rng = np.random.default_rng(seed)
@@ -121,42 +124,55 @@ def parts(
             store=kept,
             progress=bar.update,
         )
-    runs(found, settings)
+    runs(told, found, settings)
     traces = {name: along(article, name) for name in article.controllers}
-    trajectories(article, traces)
-    switching(article, traces["smc"])
+    trajectories(told, article, traces)
+    switching(told, article, traces["smc"])
+    return in_words(gains, over, found)
 
 
-def gain_conditions(gains: dict[str, Gains], over: theorem.OperatingSet) -> None:
-    """Print whether conditions (28), (30) and (31) hold for some gains over an operating set."""
+def in_words(gains: dict[str, Gains], over: theorem.OperatingSet, found: Convergence) -> str:
+    """Which gains satisfy the conditions, and what that brought."""
+    bounds = theorem.suprema(over)
+    met = {name: sum(row.literal for row in theorem.conditions(value, bounds)) for name, value in gains.items()}
+    counts = "; ".join(f"{name}, {count} of 3" for name, count in met.items())
+    answer = f"Conditions (28), (30) and (31) that hold as printed: {counts}."
+    if not found.tested.any():
+        return answer
+    better = pair(found.velocity_rms["printed"] / found.velocity_rms["designed"])
+    return f"{answer} RMS errors of (h', theta') are ({better}) times smaller with the designed than the printed gains."
+
+
+def gain_conditions(told: Told, gains: dict[str, Gains], over: theorem.OperatingSet) -> None:
+    """Tell whether conditions (28), (30) and (31) hold for some gains over an operating set."""
     bounds = theorem.suprema(over)
     rows = [
         (name, row.name, pair(row.gain), pair(row.supremum), " ".join(map(said, row.by_row)), said(row.literal))
         for name, value in gains.items()
         for row in theorem.conditions(value, bounds)
     ]
-    print(
+    told.say(
         f"Over |theta| <= {over.theta} rad, |h'| <= {over.speed[0]} m/s, |theta'| <= {over.speed[1]} rad/s, "
         f"plants within {100 * over.uncertainty:g} %:\n"
     )
     header = ("gains", "condition", "gain (h, theta)", "supremum", "row by row", "as printed")
-    print(tabulate(rows, header, disable_numparse=True))
+    told.table(header, rows)
 
 
-def runs(found: Convergence, settings: TheoremSettings) -> None:
-    """Print what the runs showed."""
+def runs(told: Told, found: Convergence, settings: TheoremSettings) -> None:
+    """Tell what the runs showed."""
     stayed, total = found.tested, len(found.stayed)
     n, inside = int(stayed.sum()), int(found.kept[stayed].sum())
     bounds = ", ".join(f"{value:.2f}" for value in found.largest)
-    print(f"Largest |theta|, |h'|, |theta'|, estimates of these, and |u|: {bounds}.")
-    print(
+    told.say(f"Largest |theta|, |h'|, |theta'|, estimates of these, and |u|: {bounds}.")
+    told.say(
         f"{n} of {total} runs stayed in the operating set, with |u| <= {settings.force.value:g} N, and outlasted t0; "
         f"{total - n} did not and are not counted."
     )
     if not n:
         return
     interval = stats.binomtest(inside, n).proportion_ci(method="wilson")
-    print(
+    told.say(
         f"{inside} of {n} were inside the layer of both positions by the time of (43) and stayed there, which is seen "
         "and, with tanh, not promised "
         f"(95 % Wilson interval {interval.low:.4f} to {interval.high:.4f}).\n"
@@ -166,7 +182,7 @@ def runs(found: Convergence, settings: TheoremSettings) -> None:
             state,
             f"{np.median(found.promised[i, stayed]):.3f}",
             f"{np.median(found.reached[i, stayed]):.3f}",
-            f"{np.min((found.promised - found.reached)[i, stayed]):.4f}",
+            f"{np.min((found.promised - found.reached)[i, stayed]):z.4f}",
             f"{np.median(found.promised_velocity[i, stayed]):.3f}",
             f"{np.nanmax(found.velocity_error[i, stayed]):.3f}",
         )
@@ -180,8 +196,8 @@ def runs(found: Convergence, settings: TheoremSettings) -> None:
         "t1 of (48), s",
         "largest velocity error after t1",
     )
-    print(tabulate(rows, header, disable_numparse=True), "\n")
-    with_tanh(found, settings.settle.value)
+    told.table(header, rows, " \n\n")
+    with_tanh(told, found, settings.settle.value)
     rms = [
         (name, *(f"{v:.2g}" for v in values), pair(found.velocity_rms["printed"] / values))
         for name, values in found.velocity_rms.items()
@@ -192,19 +208,19 @@ def runs(found: Convergence, settings: TheoremSettings) -> None:
         "theta', rad/s",
         "smaller by",
     )
-    print(tabulate(rms, title, disable_numparse=True), "\n")
+    told.table(title, rms, " \n\n")
 
 
-def with_tanh(found: Convergence, settle: float) -> None:
+def with_tanh(told: Told, found: Convergence, settle: float) -> None:
     """The bounds that hold with tanh, which (43) and (48) are not."""
     n = int(found.stayed.sum())
     for i, share in enumerate(SHARES):
         kept = found.bounded[i][:, found.stayed].all(axis=0)
-        print(
+        told.say(
             f"{int(kept.sum())} of {n} kept |e| <= atanh((V + kappa) / m1) / k_p from |e(0)| / kappa on, "
             f"kappa = {share:g} (m1 - V)."
         )
-    print(
+    told.say(
         f"In the end |X2 - X2hat| is at most ({pair(found.velocity_bound)}) m/s, rad/s; largest after {settle:g} s: "
         f"({pair(found.velocity_settled[:, found.stayed].max(axis=1))}).\n"
     )
@@ -224,8 +240,8 @@ def along(article: Scenario, controller: str) -> Traces:
     return result.traces
 
 
-def trajectories(article: Scenario, traces: dict[str, Traces]) -> None:
-    """Print what conditions (28), (30) and (31) want along runs of Table 5's cases."""
+def trajectories(told: Told, article: Scenario, traces: dict[str, Traces]) -> None:
+    """Tell what conditions (28), (30) and (31) want along runs of Table 5's cases."""
     rows = []
     for name, runs in traces.items():
         gains = Gains.of(article.controllers[name].observer.gains.value)
@@ -235,11 +251,11 @@ def trajectories(article: Scenario, traces: dict[str, Traces]) -> None:
             verdicts = [f"{pair(row.supremum)} ({' '.join(map(said, row.by_row))})" for row in checked]
             rows.append((f"{name.upper()}, case {case}", *verdicts))
     names = ("(28): sup |X2| (row by row)", "(30): sup of the drift's error", "(31): sup of the gain's error")
-    print(tabulate(rows, ("Table 5, nominal plant", *names), disable_numparse=True), "\n")
+    told.table(("Table 5, nominal plant", *names), rows, " \n\n")
 
 
-def switching(article: Scenario, traces: Traces) -> None:
-    """Print whether (51) and (52) hold along SMC runs of Table 5's cases on the nominal plant."""
+def switching(told: Told, article: Scenario, traces: Traces) -> None:
+    """Tell whether (51) and (52) hold along SMC runs of Table 5's cases on the nominal plant."""
     law = article.agent("smc")
     assert isinstance(law, SlidingModeController)
     rows = []
@@ -258,8 +274,8 @@ def switching(article: Scenario, traces: Traces) -> None:
         "|ds/dx f| + lambda, least",
         "holds for",
     )
-    print(tabulate(rows, header, disable_numparse=True))
-    print("\ns is a sum of squares: its gradient vanishes on s = 0, where (52) would ask 0 > lambda + delta.")
+    told.table(header, rows)
+    told.say("\ns is a sum of squares: its gradient vanishes on s = 0, where (52) would ask 0 > lambda + delta.")
 
 
 def pair(values: np.ndarray) -> str:

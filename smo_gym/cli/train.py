@@ -22,7 +22,7 @@ from tqdm import tqdm
 from .. import files
 from ..evaluation import configs
 from ..wrappers.view import KINDS
-from . import starting
+from . import between, narrow, starting
 from .arguments import Parser, fraction, versions, whole
 from .entry import Stop, command, typed
 
@@ -50,6 +50,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.seed("weights, exploration and plants")
     add("--steps", type=whole(1), metavar="N", help="control periods to learn from (default: those of --config)")
     add("--uncertainty", type=fraction, metavar="X", help="level of the plants, a fraction (default: that of --config)")
+    between.add(parser)
     add("--config", type=Path, metavar="FILE", help="hyperparameters (default: configs/ppo.yaml or ppo_lstm.yaml)")
     add("--out", type=Path, metavar="DIR", help="default: runs/ENV-OBSERVATION-ALGO-SEED")
     add("--tensorboard", action="store_true", help="write what TensorBoard shows, to DIR/tensorboard")
@@ -63,9 +64,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Train; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     args, out = parse(arguments), None
     try:
-        from ..learning import settings, training
+        from ..learning import measurement, settings, training
 
-        run = settings.load(args.config, args.env, args.algo, args.observation, args.seed, args.steps, args.uncertainty)
+        of_policy = (args.env, args.algo, args.observation, args.seed, args.steps)
+        run = settings.load(args.config, *of_policy, args.uncertainty, between.data(args))
         name = f"{run.environment}-{run.observation}-{run.algorithm}-{run.seed}"
         with files.claimed(args.out or Path("runs") / name, ["policy.safetensors", "policy.json"]) as out:
             with tqdm(total=run.steps, unit="step", unit_scale=True, desc="learning", disable=None) as bar:
@@ -87,7 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     measured = policy.card.measured
     print(f"While learning, on {measured['runs']} plants that learning does not see:\n")
     print(tabulate(curve, list(COLUMNS.values()), floatfmt=".4g"))
-    print(f"\nThe best of them, on others: {in_words(measured)}")
+    print("\n" + narrow.paragraph(f"The best of them, on others: {in_words(measured)}"))
+    beside = measurement.measure_lqr(policy.card, int(measured["runs"]))
+    if beside is not None:
+        print(narrow.paragraph(f"LQR on the same plants, on SMO estimates, as often: {in_words(beside)}"))
     print(f"The policy is {out / 'policy.safetensors'}. To watch it:\n")
     print(f"    {starting.line('watch')} {shlex.quote(str(out))}")
     return 0

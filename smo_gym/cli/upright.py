@@ -17,7 +17,7 @@ from ..article import WITHOUT
 from ..evaluation import configs, scenario, study
 from ..evaluation.arms import ARMS, THEOREM
 from ..evaluation.formats import as_csv, markdown
-from . import computing
+from . import computing, narrow
 from .arguments import Parser
 from .entry import command
 from .progress import simulated
@@ -52,19 +52,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 falls = told + table(outcomes, "github") + f"\n\nSeed {args.seed}, {markdown(str(args.config))}\n"
                 files.write_set(out, dict(zip(RESULTS, (data(outcomes), falls), strict=True)))
         finally:  # what cannot be written can be read at least
-            print(told + table(outcomes, "simple"))
+            header, rows = cells(outcomes)
+            print(f"{told}{narrow.table(header, rows)}\n\n{narrow.paragraph(in_words(outcomes))}")
+        if out is not None:
+            print(f"falls.csv and falls.md are in {out}")
     return 0
 
 
 def table(outcomes: Sequence[study.Outcome], form: str) -> str:
     """Percentages of runs that fell, by start, level and arm, in a format of tabulate."""
-    cells: dict[tuple[str, str], dict[str, str]] = {}
+    header, rows = cells(outcomes)
+    return tabulate(rows, header, tablefmt=form, disable_numparse=True)
+
+
+def cells(outcomes: Sequence[study.Outcome]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Header and rows of the table."""
+    found: dict[tuple[str, str], dict[str, str]] = {}
     for group, falls, runs, low, high in counts(outcomes):
         text = f"{100 * falls / runs:.1f} [{100 * low:.1f}, {100 * high:.1f}]"
-        cells.setdefault((group.case, f"{100 * group.uncertainty:g} %"), {})[group.arm] = text
-    rows = [(*place, *(by_arm[arm] for arm in TITLES)) for place, by_arm in cells.items()]
+        found.setdefault((group.case, f"{100 * group.uncertainty:g} %"), {})[group.arm] = text
+    rows = [(*place, *(by_arm[arm] for arm in TITLES)) for place, by_arm in found.items()]
     rows.sort(key=lambda row: row[0])  # starts, each with its levels in order
-    return tabulate(rows, ("start, rad", "uncertainty", *TITLES.values()), tablefmt=form, disable_numparse=True)
+    return ("start, rad", "uncertainty", *TITLES.values()), rows
+
+
+def in_words(outcomes: Sequence[study.Outcome]) -> str:
+    """How many fell over all starts, where the plants differ most."""
+    most = max(outcome.group.uncertainty for outcome in outcomes)
+    shares = {}
+    for arm, title in TITLES.items():
+        fell = [o.failed for o in outcomes if o.group.arm == arm and o.group.uncertainty == most]
+        shares[title] = f"{100 * sum(each.sum() for each in fell) / sum(each.size for each in fell):.1f} %"
+    told = "; ".join(f"{title}, {share}" for title, share in shares.items())
+    return f"At {100 * most:g} % of uncertainty, over all starts, this many fall: {told}."
 
 
 def data(outcomes: Sequence[study.Outcome]) -> str:

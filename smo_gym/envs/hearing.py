@@ -33,7 +33,7 @@ class Hearing:
 
     def __init__(self, task: Task) -> None:
         sensor, actuator = task.sensor, task.actuator
-        self._plain = task.ideal and sensor.exact
+        self._plain = task.exact
         self._exact, self._ideal = sensor.exact, actuator.ideal
         self._rubs, self._pushed = bool(task.rubs), bool(task.disturbance)
         self._stamped, self._measured = sensor.jitter > 0.0, actuator.measured

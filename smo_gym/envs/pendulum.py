@@ -19,7 +19,7 @@ from .desired import Desired
 from .hearing import Heard, Hearing
 from .rendering import MODES, Renderer, Scene
 from .spec import Specified
-from .stepping import begin, loop_of
+from .stepping import begin, complain, loop_of
 from .task import HANGING, TRACKING, UPRIGHT, Task
 
 RESET_OPTIONS = ("state", "params", "noise")
@@ -123,8 +123,9 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
 
     With the extra `render` (pygame-ce). Cart, rod and bob as they are, of this episode's rod length; the force as an
     arrow, one and a half rods long at the limit (at 30 N without one); the reference in green; and under
-    :class:`smo_gym.ObserverWrapper` the estimate as a ghost in blue, both with the same rod. The frame goes along with
-    a cart that leaves its middle. `metadata["render_fps"]` is that of real time, one frame a control period.
+    :class:`smo_gym.ObserverWrapper` the estimate as a ghost in blue, both with the same rod; where the sensor is not
+    exact, crosses at what it says of cart and bob. The frame goes along with a cart that leaves its middle.
+    `metadata["render_fps"]` is that of real time, one frame a control period.
 
     Raises:
         ValueError: an option is unknown or its value is not allowed; an action of another shape or not finite.
@@ -191,6 +192,7 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         truncated = self._steps_left == 0 and not terminated
         if terminated:
             self._steps_left = 0
+            complain(loop, loop.failed > 0.0)
         info = self._info(heard, k)
         self._see(k, info["force"])
         return self._observation(k), loop.reward.item(), terminated, truncated, info
@@ -227,7 +229,8 @@ class PendulumEnv(Specified, gymnasium.Env[Array, Array]):
         if self.render_mode is None:
             return
         x_d = None if self._desired is None else self._desired.states[k]
-        self._scene = Scene(k * self.task.control_period, self.loop.x[:, 0].copy(), self._params[2], force, x_d)
+        y = None if self.task.sensor.exact else self.loop.y[:, 0].copy()
+        self._scene = Scene(k * self.task.control_period, self.loop.x[:, 0].copy(), self._params[2], force, x_d, y)
         if self.render_mode == "human" and self._ghost is None:  # else once the ghost has moved, too
             self.render()
 

@@ -24,6 +24,7 @@ MODES = ["human", "rgb_array"]
 SIZE = (800, 400)
 """Width and height of a frame in pixels."""
 CART, BOB, ESTIMATE, REFERENCE, FORCE = "#4D5866", "#D55E00", "#0072B2", "#009E73", "#E69F00"
+MEASURED = "#CC79A7"
 """Colours: those of Okabe and Ito, and a grey."""
 _INK, _PALE, _PAPER = "#1A1A1A", "#B8BEC6", "#FFFFFF"
 _FINE = 2  # times finer than the frame is what is drawn, then smoothed
@@ -45,6 +46,8 @@ class Scene:
     """Force in N that the actuator applied until now."""
     desired: Array | None
     """Where h in m and theta in rad should be, (2 or more,); None without a reference."""
+    measured: Array | None = None
+    """What the sensor says of h in m and theta in rad, (2,); None where it is exact."""
 
 
 def bob(task: Task, position: Array, rod: float) -> Point:
@@ -179,6 +182,8 @@ class Renderer:
         self._pendulum(canvas, scene)
         if ghost is not None:
             self._outline(canvas, scene, _drawable(ghost), ESTIMATE)
+        if scene.measured is not None:
+            self._crosses(canvas, scene, _drawable(scene.measured))
         self._arrow(canvas, scene)
         self._captions(canvas, scene, ghost)
         frame: pygame.Surface = pg.transform.smoothscale(canvas, SIZE)
@@ -231,6 +236,15 @@ class Renderer:
         pg.draw.line(canvas, colour, cart.center, end, round(0.35 * u))
         pg.draw.circle(canvas, colour, end, 1.4 * u, round(0.35 * u))
 
+    def _crosses(self, canvas: pygame.Surface, scene: Scene, position: Array) -> None:
+        """Where cart and bob are by what was measured."""
+        u = self._unit
+        for point in ((float(position[0]), 0.0), bob(self._task, position, scene.rod)):
+            x, y = self._at(scene, point)
+            for side in (-1.0, 1.0):
+                ends = (x - 0.9 * u, y - side * 0.9 * u), (x + 0.9 * u, y + side * 0.9 * u)
+                self._pygame.draw.line(canvas, MEASURED, *ends, round(0.5 * u))
+
     def _arrow(self, canvas: pygame.Surface, scene: Scene) -> None:
         """The force on the cart: 1.5 rods, always in sight, for the largest (30 N where there is no limit)."""
         pg, u = self._pygame, self._unit
@@ -253,6 +267,7 @@ class Renderer:
         keys = [(FORCE, f"force {scene.force:+.1f} N")]
         keys += [(ESTIMATE, "estimate")] * (ghost is not None)
         keys += [(REFERENCE, "reference")] * (scene.desired is not None)
+        keys += [(MEASURED, "measured")] * (scene.measured is not None)
         x = 16 * u
         for colour, text in keys:
             label = self._text.render(text, True, _INK)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from gymnasium import logger
 from numpy.typing import ArrayLike
 
 from .. import disturbances, sensors
@@ -81,6 +82,13 @@ def begin(loop: Loop, task: Task, slots: Slots, cases: Sequence[Case]) -> None:
     if task.disturbance:
         disturbances.begin(loop.own("disturbance"), slots, task.disturbance, keys)
     loop.begin(slots, np.array([case.state for case in cases]).T)
+
+
+def complain(loop: Loop, ended: Flags) -> None:
+    """Warn of a disturbance that was not finite and has just ended episodes, (n,)."""
+    when = disturbances.refused(loop)
+    for slot in np.flatnonzero(ended & (when > 0.0)):
+        logger.warn(f"slot {slot}: its disturbance was not finite at t = {when[slot]:g} s, which ends the episode")
 
 
 def checked_force(action: ArrayLike, n: int, ignored: Flags | None = None) -> Array:

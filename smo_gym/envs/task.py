@@ -180,6 +180,11 @@ class Task:
         return self.actuator.ideal and not self.disturbance and not self.rubs
 
     @property
+    def exact(self) -> bool:
+        """Whether nothing stands between plant and computer, as in the article."""
+        return self.ideal and self.sensor.exact
+
+    @property
     def random(self) -> bool:
         """Whether anything in an episode is random beside its plant and initial state."""
         rubs = self.friction_uncertainty > 0.0 and bool(self.rubs)

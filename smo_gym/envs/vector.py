@@ -24,7 +24,7 @@ from .pendulum import RESET_OPTIONS, PendulumEnv, TrackingEnv, UprightEnv
 from .rendering import Renderer, Scene
 from .resetting import instants, marked, seeds_of, slot_by_slot
 from .spec import Specified
-from .stepping import begin, checked_force, loop_of
+from .stepping import begin, checked_force, complain, loop_of
 from .task import Task
 
 
@@ -157,6 +157,8 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
         info = self._info(heard)
         ended = terminated | truncated
         self._waiting = bool(np.count_nonzero(ended))
+        if self._waiting:
+            complain(loop, terminated if over is None else terminated & ~over)
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._waiting:
             info = self._restart(ended, heard, info)
         return self._observation(), reward, terminated, truncated, info
@@ -195,6 +197,7 @@ class PendulumVectorEnv(Specified, VectorEnv[Array, Array, Array]):
                     self._params_told[i, 2],
                     self._force[i],
                     x_d[i],
+                    None if self.task.sensor.exact else self.loop.y[:, i].copy(),
                 ),
                 None if self._ghosts is None else self._ghosts[:, i],
             )

@@ -9,6 +9,7 @@ from typing import Any
 from gymnasium.vector import AutoresetMode, VectorEnv
 
 from ..controllers import Agent
+from ..disturbances import refused
 from ..envs.task import Task
 from ..loop import runs_as_part
 from ..typing import Array, Flags
@@ -26,6 +27,8 @@ class Rollout:
     failed: Flags
     """Runs that terminated (off the track, fallen, not finite) or whose estimate diverged or was lost, (n,)."""
     traces: Traces | None
+    refused: Array
+    """When in s a run ended at a disturbance that was not finite, (n,); 0 in the others."""
 
 
 def rollout(
@@ -80,4 +83,5 @@ def rollout(
     for name, meter in metrics.METERS.items():
         values = meter.finish(loop.own(name), task.control_period)
         found |= {metric.name: row for metric, row in zip(meter.metrics, values, strict=True)}
-    return Rollout(found, loop.failed > 0.0, None if tracer is None else tracer.traces())
+    pushed = loop if "disturbance" in loop.parts or not task.disturbance else env.unwrapped.loop  # type: ignore[attr-defined]
+    return Rollout(found, loop.failed > 0.0, None if tracer is None else tracer.traces(), refused(pushed))

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Generic, Literal, Self, TypeVar
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar, get_origin
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_serializer,
+    field_validator,
+    model_validator,
+)
 
 from ..controllers import LQR, Agent, SlidingModeController
 from ..observers import Gains, SlidingModeObserver
 from ..plant import CartPendulum
 from ..policies import named
+from ..presets import spelled
 from ..theorem import OperatingSet, design, stable
 from . import reading
 
@@ -46,6 +56,10 @@ class Setting(Strict, Generic[T]):
     source: Literal["printed", "identified", "chosen"]
     note: str = ""
 
+    @field_serializer("value", mode="wrap", when_used="json")
+    def _spelled(self, value: Any, handler: SerializerFunctionWrapHandler) -> Any:
+        return spelled(value) if callable(value) else handler(value)
+
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle, which finds no class ``Setting[float]`` by its name."""
         return _again, (type(self).__name__, dict(self), self.model_fields_set)
@@ -75,7 +89,11 @@ class Settings(Strict):
         Raises:
             ValueError: there is no setting of a name, or its value is not allowed.
         """
-        kinds = {name: reading.models(field.annotation) for name, field in type(self).model_fields.items()}
+        kinds = {
+            name: reading.models(field.annotation)
+            for name, field in type(self).model_fields.items()
+            if get_origin(field.annotation) is not dict  # of settings that each have a source
+        }
         given = {
             name: {"value": value, "source": "chosen", "note": note}
             if any(issubclass(kind, Setting) for kind in kinds.get(name, ()))
@@ -237,6 +255,9 @@ def _for_a_task(options: dict[str, Setting[Any]]) -> dict[str, Setting[Any]]:
             raise ValueError(f"{name!r} does not belong here: it is the scenario's own setting {ELSEWHERE[name]!r}")
         if name in (*OF_A_BATCH, "render_mode"):
             raise ValueError(f"{name!r} does not belong here: it is of how episodes are run, not of what they are")
+    function = options["disturbance"].value if "disturbance" in options else None
+    if isinstance(function, str) and ":" in function:
+        raise ValueError(f"a file may not name code: say --disturbance {function} on the command line")
     return options
 
 

@@ -51,7 +51,8 @@ def results(outcomes: Sequence[Outcome]) -> list[Result]:
     mild tails; where the median is far from the mean, more runs are needed. RMS is the root of the mean MSE, as in the
     article. A reduction is ``100 (1 - with / without)`` in percent, over pairs of runs on the same plant. The row
     "average" is over the published rows, as the article's, and its reduction is that of the averages (the article's
-    Table 4; its Table 5 averages the reductions).
+    Table 4; its Table 5 averages the reductions). Nothing is published where anything
+    stands between plant and computer.
     """
     found: list[Result] = []
     for rows, uncertainty, case in _rows(outcomes):
@@ -60,7 +61,9 @@ def results(outcomes: Sequence[Outcome]) -> list[Result]:
                 chosen = [row for row in rows if row.group.arm == arm]
                 found += _cells(chosen, state, uncertainty, case) if chosen else []
             found += _reduction(rows, state, uncertainty, case)
-    return found
+    scenarios = {id(outcome.group.scenario): outcome.group.scenario for outcome in outcomes}.values()
+    others = {place.table for place in scenarios if not place.task.exact}
+    return [replace(each, published=math.nan) if each.cell.table in others else each for each in found]
 
 
 def _rows(outcomes: Sequence[Outcome]) -> list[Row]:

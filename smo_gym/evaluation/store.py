@@ -69,11 +69,13 @@ class Store:
     def key(self, group: Group, seed: int, samples: int | None) -> str | None:
         """Hash of all that a group depends on.
 
-        None where code of the user's own takes part, in agent, observer, meter or environment, of which no hash can
-        be relied on.
+        None where code of the user's own takes part, in agent, observer, meter, disturbance or environment, of which no
+        hash can be relied on.
         """
         scenario, settings = group.scenario, group.settings
         makers = [arm(group.arm).observer, *(meter.finish for meter in metrics.METERS.values())]
+        if "disturbance" in scenario.options and any(each.function for each in scenario.task.disturbance):
+            return None
         if not _is_ours(scenario.environment) or not all(maker.__module__.startswith("smo_gym.") for maker in makers):
             return None
         policy = []

@@ -71,6 +71,8 @@ class Outcome:
     """Traces of the first :data:`TRACED_RUNS` runs, where :func:`measure` was asked for them."""
     plants: Array | None = None
     """The runs' plants [M_c, m, l, g] in kg, kg, m and m/s^2, (runs, 4)."""
+    refused: Array | None = None
+    """When in s a run ended at a disturbance that was not finite, (runs,), 0 in the others; None of a store's."""
 
     @property
     def left(self) -> Flags | None:
@@ -274,11 +276,18 @@ def _run(
         trace_slots=np.concatenate(slots).tolist(),
         progress=lambda steps: progress(steps * dt * n),
     )
-    failed = np.split(result.failed, edges)
+    failed, refused = np.split(result.failed, edges), np.split(result.refused, edges)
     columns = {name: np.split(values, edges) for name, values in result.metrics.items()}
     traces = _split(result.traces, [len(part) for part in slots])
     return [
-        Outcome(group, {name: parts[i] for name, parts in columns.items()}, failed[i], traces[i], params[slots[i]])
+        Outcome(
+            group,
+            {name: parts[i] for name, parts in columns.items()},
+            failed[i],
+            traces[i],
+            params[slots[i]],
+            refused[i],
+        )
         for i, group in enumerate(batch)
     ]
 

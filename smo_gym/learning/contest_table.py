@@ -26,12 +26,16 @@ class Row:
 
 
 def render(rows: Sequence[Row], levels: Sequence[float], form: str) -> str:
-    """Both tables: over all levels as a matrix, and level by level with what failed.
+    """Both tables in a format of tabulate."""
+    return "\n\n".join(formats.table(form, top, lines) for top, lines in tables(rows, levels))
+
+
+def tables(rows: Sequence[Row], levels: Sequence[float]) -> list[tuple[list[str], list[list[str]]]]:
+    """Header and lines of both tables: over all levels as a matrix, and level by level with what failed.
 
     Args:
         rows: the contenders.
         levels: of uncertainty, as fractions.
-        form: a format of tabulate.
     """
     kinds = [kind for kind in KINDS if any(row.scores.contender.observation == kind for row in rows)]
     cells = {(row.scores.contender.controller, row.scores.contender.observation): _span(row.means[-1]) for row in rows}
@@ -57,8 +61,7 @@ def render(rows: Sequence[Row], levels: Sequence[float], form: str) -> str:
         ]
         for row in rows
     ]
-    tables = ((["all levels", *kinds], matrix), (header, detail))
-    return "\n\n".join(formats.table(form, top, lines) for top, lines in tables)
+    return [(["all levels", *kinds], matrix), (header, detail)]
 
 
 def _steps(row: Row) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -98,8 +99,11 @@ def load(
     seed: int = 0,
     steps: int | None = None,
     uncertainty: float | None = None,
+    others: Mapping[str, Any] | None = None,
 ) -> Run:
     """A run from a file of hyperparameters in rl-baselines3-zoo's shape; what is given here takes their place.
+
+    ``others`` are more options of the environment.
 
     Raises:
         ValueError: the file cannot be read, or an unknown, missing or bad value.
@@ -116,7 +120,7 @@ def load(
         options = given.pop("env_kwargs", {})
         if not isinstance(options, dict):
             raise ValueError(f"{environment}: env_kwargs={options!r} must be a mapping of the environment's options")
-        options = options | ({} if uncertainty is None else {"uncertainty": uncertainty})
+        options = options | ({} if uncertainty is None else {"uncertainty": uncertainty}) | {**(others or {})}
         for name in ("n_envs", "n_timesteps", *WHOLE):
             if isinstance(given.get(name), float) and given[name].is_integer():  # YAML says 1e6, the zoo !!float 1e6
                 given[name] = int(given[name])

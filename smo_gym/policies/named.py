@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import importlib
 from pathlib import Path
-from types import ModuleType
-from typing import cast
+from types import FunctionType, ModuleType
+from typing import Any, cast
+
+from numba.core.dispatcher import Dispatcher
 
 from ..controllers import Agent
 from ..validation import choice, unknown
@@ -77,16 +79,27 @@ def imported(name: str) -> ModuleType:
         raise ValueError(f"cannot import {name!r} ({type(error).__name__}: {error})") from error
 
 
-def _own(name: str) -> Agent:
+def own(name: str, what: str = "function") -> Any:
+    """What ``module:name`` names in a user's module, a class or a function.
+
+    Raises:
+        ValueError: there is none.
+    """
     module_name, _, attribute = name.partition(":")
     try:
         module = imported(module_name)
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
-    made = getattr(module, attribute, None)
-    if not callable(made):
-        known = [word for word, value in vars(module).items() if isinstance(value, type) and not word.startswith("_")]
-        raise ValueError(unknown(f"class in {module_name}", attribute, known))
+    found = getattr(module, attribute, None)
+    if not callable(found):
+        kinds = type if what == "class" else (FunctionType, Dispatcher)
+        known = [word for word, value in vars(module).items() if isinstance(value, kinds) and not word.startswith("_")]
+        raise ValueError(unknown(f"{what} in {module_name}", attribute, known))
+    return found
+
+
+def _own(name: str) -> Agent:
+    made = own(name, "class")
     try:
         agent = made()
     except (Exception, SystemExit) as error:

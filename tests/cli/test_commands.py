@@ -19,11 +19,13 @@ MODULE = [sys.executable, "-m", "smo_gym"]
 SHARED = {
     "answer",
     "arguments",
+    "between",
     "cluster",
     "commands",
     "computing",
     "console",
     "entry",
+    "narrow",
     "processes",
     "progress",
     "recording",

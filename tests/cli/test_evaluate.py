@@ -207,11 +207,11 @@ def test_falls_of_the_upright_plant_are_counted(command, tmp_path):
     lines = command("upright", "--config", tmp_path / "upright.yaml", "--runs", "20").stdout.splitlines()
     near, far = (next(line for line in lines if line.startswith(case)) for case in ("near", "far"))
     assert near.count("0.0 [0.0, 16.1]") == 4
-    assert far.count("100.0 [83.9, 100.0]") >= 2
+    assert far.count("100.0 [83.9,") >= 2
 
 
 def test_the_article_is_checked_against_itself(command):
-    assert "133 of 138 printed numbers follow from the printed cells." in command("consistency").stdout
+    assert "133 of 138 printed numbers follow from the printed cells" in command("consistency").stdout
 
 
 @pytest.mark.slow

@@ -278,3 +278,27 @@ def test_any_options_are_refused_by_name_or_work():
     rng = np.random.default_rng(0)
     worked = [refused_or_worked(random_options(rng)) for _ in range(1000)]
     assert 100 < sum(worked) < 900
+
+
+def _lost(t, h, theta, v, omega):
+    return (math.nan if t > 0.03 and h > 0.5 else 0.0), 0.0
+
+
+@pytest.mark.parametrize("mode", ["Disabled", "NextStep", "SameStep"])
+def test_a_disturbance_that_is_not_finite_is_named_once_an_episode(make_vec, mode):
+    options = {"state": np.array([[0.0] * 4, [1.0, 0, 0, 0]])}
+    env = make_vec(2, disturbance=_lost, initial_state=(0.0, 0.0, 0.0, 0.0), autoreset_mode=mode)
+    env.reset(seed=0, options=options)
+    env.step(np.zeros((2, 1)))
+    with pytest.warns(UserWarning, match=r"slot 1: its disturbance was not finite at t = 0\.031 s"):
+        env.step(np.zeros((2, 1)))
+    for _ in range(3):
+        env.step(np.zeros((2, 1)))  # a warning would be an error
+
+
+def test_one_episode_whose_disturbance_is_not_finite_says_so():
+    env = gymnasium.make("SMOPendulum-v0", disturbance=_lost, disable_env_checker=True).unwrapped
+    env.reset(seed=0, options={"state": [1.0, 0, 0, 0]})
+    env.step(np.zeros(1))
+    with pytest.warns(UserWarning, match=r"slot 0: its disturbance was not finite at t = 0\.031 s"):
+        assert env.step(np.zeros(1))[2]

@@ -277,3 +277,18 @@ def test_a_batch_makes_a_video(make_vec, tmp_path):
         envs.step(np.zeros((2, 1)))
     envs.close()
     assert [path.suffix for path in (tmp_path / "videos").iterdir()]
+
+
+def test_crosses_show_what_a_sensor_says_where_it_is_not_exact():
+    said = np.array([0.5, 0.4])
+    frame, env = frame_of(sensor={"bias": said}, state=(0.0, 0.0, 0.0, 0.0))
+    rows, columns = pixels(frame, rendering.MEASURED)
+    for point in ((said[0], 0.0), rendering.bob(env.task, said, env.task.params.rod_length)):
+        x, y = rendering.to_pixel(env.task, np.zeros(4), point)
+        near = (np.abs(rows - y) < 10) & (np.abs(columns - x) < 10)
+        assert np.mean(columns[near]) == pytest.approx(x, abs=1.5)
+        assert np.mean(rows[near]) == pytest.approx(y, abs=1.5)
+    vector = gymnasium.make_vec("SMOPendulum-v0", 1, render_mode="rgb_array", sensor={"bias": said}, uncertainty=0.0)
+    vector.reset(options={"state": np.zeros(4)})
+    assert (vector.render()[0] == frame).all()
+    assert not pixels(frame_of()[0], rendering.MEASURED)[0].size

@@ -68,3 +68,14 @@ def test_blocks_have_the_averages_of_the_results(small):
     assert found.cells.near == sum(arm.cells.near for arm in found.arms)
     assert math.isnan(found.arms[2].mse[0].published)
     assert found.effort_ratio == pytest.approx(found.arms[1].effort / found.arms[0].effort)
+
+
+def test_a_ceiling_is_over_the_cells_that_have_one(small):
+    outcomes = study.measure(study.groups([small], ["lqr"], ["with"], 11), seed=0)
+    results = statistics.results(outcomes)
+    assert 0.0 <= Cells.of(results).ceiling <= Cells.of(results).count
+    none_stands = [replace(r, measured=math.nan, ceiling=math.nan) if r.cell.state == "h" else r for r in results]
+    assert math.isfinite(Cells.of(none_stands).ceiling)
+    assert Cells.of(none_stands).count == Cells.of(results).count
+    ceilings = [block(ceiling=22.0), block(ceiling=math.nan)]
+    assert "would bring 22.0." in answer.words(ceilings)[1]

@@ -11,7 +11,7 @@ import numpy as np
 from .. import verdicts
 from ..statistics import Result
 from ..study import Outcome
-from .tables import REDUCTION, by_table, title, within
+from .tables import REDUCTION, by_table, ceiling, compared, title, within
 
 STATES = ("h", "theta")
 
@@ -38,8 +38,8 @@ class Cells:
     @classmethod
     def of(cls, rows: Iterable[Result]) -> Cells:
         """Counted in some results."""
-        compared = [r for r in rows if r.cell.metric == "mse" and not r.cell.is_average and r.published > 0.0]
-        return cls(sum(map(within, compared)), len(compared), sum((row.ceiling for row in compared), 0.0))
+        cells = compared(rows)
+        return cls(sum(map(within, cells)), len(cells), ceiling(cells))
 
     @property
     def few(self) -> bool:
@@ -72,6 +72,8 @@ class Block:
     """What the compensation takes off the averages, of h and of theta, in percent; empty without both arms."""
     cells: Cells
     cost: verdicts.Cost | None
+    refused: tuple[str, ...] = ()
+    """A sentence on each run that ended at a disturbance that was not finite."""
 
     @property
     def name(self) -> str:
@@ -101,9 +103,19 @@ def blocks(outcomes: Sequence[Outcome], results: Sequence[Result]) -> list[Block
                 _pairs(reductions) if reductions else (),
                 Cells.of(rows),
                 costs.get((table, controller)),
+                tuple(text for outcome in own for text in _refused(outcome)),
             )
         )
     return found
+
+
+def _refused(outcome: Outcome) -> Iterable[str]:
+    group = outcome.group
+    case = f", case {group.case}" if group.case else ""
+    where = f"Table {group.scenario.table}, {title(group.name)}, {100.0 * group.uncertainty:g} %{case}, {group.arm}"
+    for run, when in enumerate(() if outcome.refused is None else outcome.refused.tolist()):
+        if when > 0.0:
+            yield f"Run {run} of {where}: its disturbance was not finite at t = {when:g} s"
 
 
 def _average(arm: str, outcomes: Sequence[Outcome], rows: Sequence[Result]) -> Average:
@@ -132,8 +144,8 @@ def _pairs(rows: Sequence[Result]) -> tuple[Pair, ...]:
 
 
 def words(found: Sequence[Block]) -> list[str]:
-    """What the blocks say, a sentence or two each: of the compensation, of the published cells, of failures."""
-    return [text for text in (_compensation(found), _published(found), _failures(found)) if text]
+    """What the blocks say, a sentence or two each: of compensation, published cells, failures and their cause."""
+    return [text for text in (_compensation(found), _published(found), _failures(found), _pushes(found)) if text]
 
 
 def _compensation(found: Sequence[Block]) -> str:
@@ -181,15 +193,15 @@ def _span(ends: Sequence[str]) -> str:
 
 def _published(found: Sequence[Block]) -> str:
     """How many published cells are met, and which table is not reproduced."""
-    compared = [block for block in found if block.cells.count]
-    if not compared:
+    blocks = [block for block in found if block.cells.count]
+    if not blocks:
         return "Nothing is published for these runs to compare with."
-    near, count = (sum(getattr(block.cells, name) for block in compared) for name in ("near", "count"))
-    ceiling = sum(block.cells.ceiling for block in compared)
+    near, count = (sum(getattr(block.cells, name) for block in blocks) for name in ("near", "count"))
+    ceilings = [block.cells.ceiling for block in blocks if math.isfinite(block.cells.ceiling)]
     text = f"Within 10 % of the published are {near} of {count} MSE cells"
-    if math.isfinite(ceiling):
-        text += f", where ten runs with every setting exact would bring {ceiling:.1f}"
-    missed = [f"{block.name} ({block.cells.near} of {block.cells.count})" for block in compared if block.cells.few]
+    if ceilings:
+        text += f", where ten runs with every setting exact would bring {sum(ceilings):.1f}"
+    missed = [f"{block.name} ({block.cells.near} of {block.cells.count})" for block in blocks if block.cells.few]
     return f"{text}." + (f" Not reproduced, with fewer than half: Table {'; Table '.join(missed)}." if missed else "")
 
 
@@ -205,3 +217,14 @@ def _failures(found: Sequence[Block]) -> str:
         if any(arm.failed for arm in block.arms)
     ]
     return f"{failed} of {runs} runs failed and are in no average: {'; '.join(where)}."
+
+
+def _pushes(found: Sequence[Block]) -> str:
+    """Where a disturbance was not finite, first and how often."""
+    refused = [text for block in found for text in block.refused]
+    more = (
+        f", and that of {len(refused) - 1} other {'runs' if len(refused) > 2 else 'run'} at some time"
+        if len(refused) > 1
+        else ""
+    )
+    return f"{refused[0]}{more}." if refused else ""

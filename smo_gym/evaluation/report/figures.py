@@ -36,7 +36,7 @@ _QUANTITIES = {
 }
 _PALETTE = 48  # colours of a picture
 _LINE = 84  # letters in a line of a title
-_STYLE: dict[Any, Any] = {
+STYLE: dict[Any, Any] = {
     "font.size": 9,
     "axes.titlesize": 9,
     "figure.titlesize": 9,
@@ -153,7 +153,7 @@ def draw(plan: Plan, outcomes: Iterable[Outcome], results: Iterable[Result], sta
     from matplotlib import rc_context
 
     outcomes = list(outcomes)
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         if plan.kind == "mse":
             figure, text = _bars(plan, outcomes, results)
         else:
@@ -230,7 +230,7 @@ def encode(figure: Figure, form: str) -> bytes:
     from matplotlib import rc_context
 
     file = io.BytesIO()
-    with rc_context(_STYLE):
+    with rc_context(STYLE):
         figure.savefig(file, format=form, metadata={"CreationDate": None} if form == "pdf" else None)
     return _small(file) if form == "png" else file.getvalue()
 

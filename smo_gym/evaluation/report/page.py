@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from ... import files
-from .. import formats
+from .. import between, formats
 from ..arms import ARMS
 from ..statistics import Result, place
 from ..study import Group, Outcome
 from . import page_figures, page_numbers, tables
-from .page_traces import CHANNELS, LEVELS, pack, runs_that_fit
+from .page_traces import LEVELS, SENSED, channels, pack, runs_that_fit
 from .panels import WINDOW
 from .provenance import sources
 
@@ -72,9 +72,9 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
     runs = runs_that_fit(outcomes)
     places, packed = pack(outcomes, runs)
     groups = [_group(outcome, where) for outcome, where in zip(outcomes, places, strict=True)]
-    settings = sources(outcomes)
+    settings, told = sources(outcomes), channels(outcomes)
     figures = {
-        "curves": page_figures.curves(),
+        "curves": page_figures.curves(SENSED[0] in told),
         "scatter": page_figures.scatter(results),
         "bars": page_figures.bars(results),
     }
@@ -84,8 +84,8 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         plotly=base64.b64encode(zlib.compress(get_plotlyjs().encode(), 9)).decode("ascii"),
         packed=packed,
         data={
-            "channels": CHANNELS,
-            "levels": LEVELS.tolist(),
+            "channels": told,
+            "levels": LEVELS[: len(told)].tolist(),
             "colours": {arm.name: [arm.colour, arm.colour_on_dark] for arm in ARMS.values()},
             "arms": {arm.name: arm.title for arm in ARMS.values()},
             "groups": groups,
@@ -93,6 +93,7 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         figures=Markup(_json(figures)),
         effects=page_numbers.effects(outcomes, results),
         score=page_numbers.score(results),
+        between=between.lines(outcome.group.scenario for outcome in outcomes),
         summary=tables.summary(results),
         runs=sum(len(outcome.failed) for outcome in outcomes),
         failed=sum(int(outcome.failed.sum()) for outcome in outcomes),

@@ -24,8 +24,12 @@ _SYMBOLS = ("circle", "diamond", "square", "triangle-up", "star", "cross")
 _NEAR = 0.1
 
 
-def curves() -> Figure:
-    """A run's five panels with traces that are still empty; ``meta`` says what the page fills each with."""
+def curves(sensed: bool = False) -> Figure:
+    """A run's five panels with traces that are still empty; ``meta`` says what the page fills each with.
+
+    Args:
+        sensed: whether the errors of the sensors are drawn, behind those of the estimate.
+    """
     from plotly.graph_objects import Scatter
     from plotly.subplots import make_subplots
 
@@ -42,6 +46,9 @@ def curves() -> Figure:
         for kind, look in kinds.items():
             meta = {"kind": kind, "state": state}
             figure.add_trace(Scatter(mode="lines", showlegend=first, legendgroup=kind, meta=meta, **look), state + 1, 1)
+        if sensed:
+            look = {"line": {"width": 1.0}, "name": "measured − true", "meta": {"kind": "sensor", "state": state}}
+            figure.add_trace(Scatter(mode="lines", showlegend=first, **look), state + 3, 1)
         error = {"kind": "error", "state": state}
         figure.add_trace(
             Scatter(mode="lines", name="error", showlegend=False, line={"width": 1.4}, meta=error), state + 3, 1

@@ -5,7 +5,7 @@ const [FAINT, OTHER, CHOSEN] = [0, 1, 2];
 const FORCE = ["force_low", "force_high", "force"];
 // All that there are: Plotly's own set has one that uploads the figure.
 const BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]];
-const KINDS = [["truth", "error"], ["truth", "error", ...FORCE], ["truth", "estimate", "reference", "error", ...FORCE]];
+const KINDS = [["truth", "error"], ["truth", "error", ...FORCE], ["truth", "estimate", "reference", "sensor", "error", ...FORCE]];
 
 function dressed(figure) {
   const { layout } = figure;
@@ -38,12 +38,11 @@ const translucent = (hex, alpha) =>
 // What a template trace shows of a run.
 function filled(template, run, states, look) {
   const { kind, state } = template.meta, name = states[state];
-  const channel = { truth: name, estimate: `estimate_${name}`, reference: `reference_${name}`, error: `error_${name}` }[kind];
-  const y = run[channel ?? kind];
+  const y = run[state === undefined ? kind : kind === "truth" ? name : `${kind}_${name}`];
   if (!y) return null;
   const trace = { ...structuredClone(template), x: run.time, y };
   if (kind === "estimate") trace.line.color = colour("--ink");
-  else if (kind === "reference") trace.line.color = colour("--quiet");
+  else if (kind === "reference" || kind === "sensor") trace.line.color = colour("--quiet");
   else trace.line = { ...trace.line, color: translucent(look.colour, look.rank === FAINT ? 0.28 : 1) };
   if (look.rank === FAINT) trace.line.width = 1;
   if (trace.fill) trace.fillcolor = translucent(look.colour, 0.18);
