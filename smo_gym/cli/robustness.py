@@ -34,7 +34,7 @@ RESULTS = ("sensors.csv", "pushes.csv", "robustness.md")
 FIGURE = "robustness"
 PUSH = 1.0
 """Newtons of disturbance in the condition (30) that is printed."""
-_SHORT = ("h', m/s", "theta', rad/s", "MSE h", "theta", "effort", "TV of u, N", "peak, N")
+_SHORT = ("h', m/s", "theta', rad/s", "MSE h", "theta", "effort", "TV, N", "peak, N")
 
 
 @command("robustness")
