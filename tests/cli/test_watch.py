@@ -1,11 +1,13 @@
 """One run of any controller, as a file or in a window; what cannot be shown is one line."""
 
+import os
 import sys
+import tempfile
 
 import pytest
 from PIL import Image
 
-from smo_gym.cli import recording, watch
+from smo_gym.cli import animate, recording, watch
 from smo_gym.envs import rendering
 from smo_gym.policies.named import shipped
 
@@ -69,6 +71,55 @@ def test_a_request_to_close_is_seen(monkeypatch):
         assert rendering.closed_by_user()
     finally:
         pygame.display.quit()
+
+
+def interrupted_at(instant, monkeypatch):
+    """Ctrl-C in the middle of a run."""
+    run = recording.run
+
+    def cut(*arguments):
+        for k, instant_ in enumerate(run(*arguments)):
+            if k == instant:
+                raise KeyboardInterrupt
+            yield instant_
+
+    monkeypatch.setattr(recording, "run", cut)
+
+
+@pytest.mark.parametrize("kind", [".gif", ".webp", ".mp4"])
+@pytest.mark.parametrize("before", [None, b"an older film"])
+def test_an_interrupted_recording_is_one_line_and_leaves_what_was_there(kind, before, tmp_path, monkeypatch, capsys):
+    if kind == ".mp4":
+        pytest.importorskip("moviepy")
+    film = tmp_path / f"run{kind}"
+    if before:
+        film.write_bytes(before)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    interrupted_at(100, monkeypatch)
+    for command in (watch, animate) if kind != ".mp4" else (watch,):
+        assert command.main([*SHORT, "--out", str(film)]) == 130
+        name = command.__name__.rpartition(".")[2]
+        assert capsys.readouterr() == ("", f"smo-gym {name}: interrupted, nothing was written\n")
+        assert [*tmp_path.iterdir()] == ([film] if before else [])
+        assert before is None or film.read_bytes() == before
+
+
+def test_an_interruption_while_the_film_is_written_leaves_no_half_of_it(tmp_path, monkeypatch, capsys):
+    def interrupt(descriptor):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupt)
+    assert watch.main([*SHORT, "--out", str(tmp_path / "run.gif")]) == 130
+    assert capsys.readouterr() == ("", "smo-gym watch: interrupted, nothing was written\n")
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_interrupted_window_is_one_line(monkeypatch, capsys):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    interrupted_at(20, monkeypatch)
+    assert watch.main([*SHORT]) == 130
+    assert capsys.readouterr().err == "smo-gym watch: interrupted, nothing was written\n"
+    assert not rendering.load().display.get_init()
 
 
 def test_no_display_is_one_line(monkeypatch, capsys):
