@@ -165,7 +165,8 @@ class Actuator:
     goes from f_0 to ``u + (f_0 - u) e^-r``, r = dt / time_constant, and is ``u + (f_0 - u) (1 - e^-r) / r`` on average.
 
     Args:
-        unit: N per unit of command. Actions of an environment are in that unit, forces everywhere else in N.
+        unit: N per unit of command. What `step` takes is in that unit, forces everywhere else in N: agents say
+            newtons, which the harness divides by it, and so must who steps by hand.
         resolution: one step of the converter in N, None for none.
         delay: in whole sampling periods.
         dead_zone: in N, as of dry friction in a gear.

@@ -32,10 +32,11 @@ _CART_POLE = (
     "recordings V1)"
 )
 _SUITE = (
-    "Real-World RL suite, combined challenge {!r} (Dulac-Arnold et al., Challenges of real-world reinforcement "
-    "learning, Machine Learning 110, 2021): noise of {} on each observation, a delay of {} steps, dropped and stuck "
-    "sensors with probability {} for {} steps, at the 10 ms a step of its cart pole. There a dropped value is 0, here "
-    "the last one; there the noise is on cos and sin of the angle"
+    "of the Real-World RL suite's combined challenge {!r} the sensors (Dulac-Arnold et al., Challenges of real-world "
+    "reinforcement learning, Machine Learning 110, 2021), without its action noise and repetition, perturbed physics "
+    "and delayed rewards, and at a sampling period of 1 ms: noise of {} on each observation, a delay of {} steps, "
+    "dropped and stuck sensors with probability {} for {} steps, at the 10 ms a step of its cart pole. There a dropped "
+    "value is 0, here the last one; there the noise is on cos and sin of the angle"
 )
 
 
@@ -99,18 +100,26 @@ ACTUATORS = {
         Actuator(unit=26.49, back_emf=44.88),
         f"{_CART_POLE}: 9.56 m/s^2 at full command and 16.2 1/s of back-EMF, all viscous friction of the cart "
         "in it, on "
-        "2.77 kg that move; no delay (0 to 0.4 ms). Newtons follow from the 0.087 kg of its pole",
+        "2.77 kg that move; full command is 1, so force_limit=26.49; no delay (0 to 0.4 ms). Newtons follow "
+        "from the 0.087 kg of its pole",
     ),
     "lag": Preset(Actuator(time_constant=0.005), "chosen: a current loop of some 30 Hz"),
-    "rwrl-easy": Preset(Actuator(delay=30), "Real-World RL suite, combined challenge 'easy': 3 steps of 10 ms"),
-    "rwrl-medium": Preset(Actuator(delay=60), "Real-World RL suite, combined challenge 'medium': 6 steps of 10 ms"),
-    "rwrl-hard": Preset(Actuator(delay=90), "Real-World RL suite, combined challenge 'hard': 9 steps of 10 ms"),
+    "rwrl-easy": Preset(
+        Actuator(delay=30), "Real-World RL suite, combined challenge 'easy', at 1 ms a sample: 3 steps of 10 ms"
+    ),
+    "rwrl-medium": Preset(
+        Actuator(delay=60), "Real-World RL suite, combined challenge 'medium', at 1 ms a sample: 6 steps of 10 ms"
+    ),
+    "rwrl-hard": Preset(
+        Actuator(delay=90), "Real-World RL suite, combined challenge 'hard', at 1 ms a sample: 9 steps of 10 ms"
+    ),
 }
 FRICTIONS = {
     "none": Preset(Friction(), "the article: no friction"),
     "cart-pole": Preset(
         Friction(cart_coulomb=0.504, pivot_viscous=3.53e-4),
-        f"{_CART_POLE}: 0.182 m/s^2 of Coulomb friction on 2.77 kg, 0.078 1/s about the pivot; viscous friction of the "
+        f"{_CART_POLE}: 0.182 m/s^2 of Coulomb friction on 2.77 kg, 0.078 1/s about the pivot; viscous friction "
+        "of the "
         "cart cannot be told from back-EMF and is in the actuator",
     ),
     "ip02": Preset(
@@ -122,7 +131,8 @@ DISTURBANCES: dict[str, Preset[tuple[Disturbance, ...]]] = {
     "none": Preset((), "the article: no disturbance"),
     "cart-pole": Preset(
         (Disturbance("noise", force=1.54, bandwidth=15.0),),
-        f"{_CART_POLE}: process noise of 0.081 m/s^2 per root Hz on 2.77 kg, 0.22 N per root Hz, as noise below 15 Hz, "
+        f"{_CART_POLE}: process noise of 0.081 m/s^2 per root Hz on 2.77 kg, 0.22 N per root Hz, as noise below "
+        "15 Hz, "
         "a cut-off that is chosen",
     ),
     "push": Preset(

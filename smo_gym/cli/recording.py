@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..controllers import Agent, title
 from ..envs.task import Task
-from ..evaluation.drivers import unit_of
 from ..typing import Array
 from ..validation import choice
 
@@ -62,7 +61,7 @@ def run(
         except Exception as error:  # whatever a user's agent may raise
             place = f"t = {(k - 1) * dt:g} s"
             raise ValueError(f"{title(agent)}: cannot act at {place} ({type(error).__name__}: {error})") from error
-        observation, _, failed, _, info = env.step(np.asarray(action)[0] / unit_of(agent, task))
+        observation, _, failed, _, info = env.step(np.asarray(action)[0] / task.actuator.unit)  # agents say newtons
         yield Instant(k * dt, info["state"], observation[-4:], failed)
         if failed:
             return

@@ -14,7 +14,7 @@ from ..envs.desired import Desired
 from ..envs.task import Task
 from ..envs.vector import PendulumVectorEnv
 from ..kernels.blocks import X, Y, block, put_two, two
-from ..loop import Loop, Part, runs_as_part
+from ..loop import Loop, Part
 from ..typing import Array
 from ..wrappers import VectorObserverWrapper
 from ..wrappers.inside import as_they_are
@@ -66,11 +66,6 @@ def driven(env: PendulumVectorEnv, law: Any, parts: Mapping[str, Part], watch: W
     return loop
 
 
-def unit_of(agent: Agent, task: Task) -> float:
-    """What an agent's forces are divided by to be actions: a law that runs in a loop says newtons."""
-    return task.actuator.unit if runs_as_part(agent, "predict") else 1.0
-
-
 @block
 def _follow(signals: Array, own: Array, lanes: int) -> None:
     for i in range(lanes):
@@ -103,7 +98,7 @@ def asked(
     loop.xhat[:], loop.y[:] = estimate(), observation[:, :2].T
     watch.look(0, loop)
     failed = np.zeros(n, dtype=np.bool_)
-    unit = unit_of(agent, task)
+    unit = task.actuator.unit  # agents say newtons
     first, agent_state = np.ones(n, dtype=np.bool_), None
     later = ~first
     failures = 0

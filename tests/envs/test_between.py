@@ -17,6 +17,7 @@ from smo_gym.disturbances import Disturbance
 from smo_gym.evaluation import rollout
 from smo_gym.friction import Friction
 from smo_gym.observers import SlidingModeObserver
+from smo_gym.policies import shipped
 from smo_gym.sensors import Sensor
 from smo_gym.validation import unknown
 
@@ -136,6 +137,15 @@ def test_commands_have_their_own_unit():
     for env in (volts, newtons):
         env.reset(seed=0)
     assert volts.step(np.array([2.0]))[4]["asked"] == newtons.step(np.array([6.0]))[4]["asked"] == 6.0
+
+
+@pytest.mark.parametrize("agent", [LQR((5.0, -3.0, 8.0, -1.0)), shipped("SMOPendulum-v0")])
+def test_agents_say_newtons_whatever_the_unit_of_commands(agent):
+    def run(unit):
+        options = {"autoreset_mode": "Disabled", "horizon": 2.0, "actuator": {"unit": unit}}
+        return rollout(VectorObserverWrapper(gymnasium.make_vec("SMOPendulum-v0", 3, **options)), agent, seed=0)
+
+    assert equal(run(1.0).metrics, run(4.0).metrics)
 
 
 @pytest.mark.parametrize("measured", [False, True])
