@@ -28,7 +28,7 @@ from .arguments import Parser, whole
 from .entry import Stop, command
 from .progress import simulated
 
-CASE = "theta(0) = 0.2"
+CASES = ("theta(0) = 0.2", "theta(0) = 0.3")
 LAWS = ("lqr", "smc")
 RESULTS = ("sensors.csv", "pushes.csv", "robustness.md")
 FIGURE = "robustness"
@@ -55,9 +55,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 measured = partial(study.measure, store=kept)
                 rows = _sensors(place, args.runs, args.seed, measured)
                 with tqdm(desc="pushes", unit="round", leave=False, disable=None) as bar:
-                    pushes = robustness.largest_pushes(
-                        upright, CASE, args.plants, args.seed, measured=measured, told=bar.update
-                    )
+                    pushes = [
+                        push
+                        for case in CASES
+                        for push in robustness.largest_pushes(
+                            upright, case, args.plants, args.seed, measured=measured, told=bar.update
+                        )
+                    ]
         except KeyboardInterrupt:
             raise Stop(f"interrupted; the same command goes on from what is in {out}") from None
         told = "\n\n".join(_said(rows, pushes, form="github"))
@@ -86,21 +90,30 @@ def _sensors(place: scenario.Scenario, runs: int, seed: int, measured: robustnes
 def _said(rows: Sequence[Row], pushes: Sequence[Push], form: str) -> list[str]:
     """All tables, each below its title, and what they say."""
     found = [_of_law(law, [row for row in rows if row.controller == law], form) for law in LAWS]
+    first, *_ = ARMS
     lines = [
         (
+            push.case if push.arm == first else "",
             ARMS[push.arm].title,
             f"{push.stood:.2f}" if math.isfinite(push.stood) else "none",
             f"{push.fell:.2f}",
             str(push.falls),
-            f"{100 * push.at_most:.2f} %" if math.isfinite(push.at_most) else "",
+            _percent(push.surviving),
         )
         for push in pushes
     ]
-    header = ("estimate", "all stand, N", "some fall, N", "so many", "share that falls, at most")
-    title = f"LQR upright from 0.2 rad, 20 %: the largest constant push that all of {pushes[0].runs} plants stand"
+    header = ("start, rad", "estimate", "all stand, N", "some fall, N", "so many", "share that stands it")
+    title = (
+        f"LQR upright, 20 %: the largest constant push that all of {pushes[0].runs} plants stand, and the share that "
+        "stands the\nleast push tried under which some fall (95 %, Clopper and Pearson)"
+    )
     words = _words(rows, pushes)
     told = textwrap.fill(words, formats.WIDTH) if form == "simple" else formats.paragraph(words, form)
     return [*found, _conditions(form), _table(title, lines, header, form), told]
+
+
+def _percent(shares: Iterable[float]) -> str:
+    return " to ".join(f"{100 * share:.2f}" for share in shares) + " %"
 
 
 def _of_law(law: str, rows: Sequence[Row], form: str) -> str:
@@ -131,13 +144,15 @@ def _words(rows: Sequence[Row], pushes: Sequence[Push]) -> str:
     error, chatter = "late_rms_theta_dot", "total_variation"
     calm, rough = (value[sensor, "lqr", "theorem"] for sensor in (exact, worst))
     printed = value[worst, "lqr", "with"][error]
-    held = {p.arm: f"{p.stood:.3g} N" if math.isfinite(p.stood) else "no push at all" for p in pushes}
+    first, *_ = CASES
+    mine = [push for push in pushes if push.case == first]
+    held = {p.arm: f"{p.stood:.3g} N" if math.isfinite(p.stood) else "no push at all" for p in mine}
     return (
         f"With noise of 1 mm and 5 mrad the designed gains' error of theta' grows {rough[error] / calm[error]:.3g} "
         f"times under LQR, and the total variation of its force {rough[chatter] / calm[chatter]:.3g} times; with the "
-        f"printed gains the error, {printed:.3g} rad/s, hardly changes: it was large before. Upright, all plants stand "
-        f"{held['without']} without compensation, {held['with']} with it, {held['theorem']} with the designed gains "
-        f"and {held['oracle']} on the true state."
+        f"printed gains the error, {printed:.3g} rad/s, hardly changes: it was large before. Upright from "
+        f"{first.rpartition(' ')[2]} rad, all plants stand {held['without']} without compensation, {held['with']} with "
+        f"it, {held['theorem']} with the designed gains and {held['oracle']} on the true state."
     )
 
 
@@ -179,5 +194,7 @@ def _rows_csv(rows: Sequence[Row]) -> str:
 
 
 def _pushes_csv(pushes: Sequence[Push]) -> str:
-    lines = [(push.arm, push.stood, push.fell, push.falls, push.runs, push.at_most) for push in pushes]
-    return formats.as_csv(("arm", "all_stand_N", "some_fall_N", "falls", "runs", "share_at_most"), lines)
+    header = ["case", "arm", "all_stand_N", "some_fall_N", "falls", "runs", "share_at_most"]
+    header += ["share_stands_ci_low", "share_stands_ci_high"]
+    lines = [(p.case, p.arm, p.stood, p.fell, p.falls, p.runs, p.at_most, *p.surviving) for p in pushes]
+    return formats.as_csv(header, lines)

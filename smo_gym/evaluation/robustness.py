@@ -31,6 +31,10 @@ MEANT = "(encoders: 0.1 mm, 4096 counts a turn; 1 mrad: noise of 0.2 mm, 1 mrad;
 UNCERTAINTY = 0.2
 SETTLED = 2000
 """Control periods before the errors of a velocity count: 2 s at the article's 1 ms."""
+FEW = 50
+"""Plants, the first ones, that bound the search for the largest push from above."""
+NEAR = 0.9
+"""Of the least push under which some of the few fall: all are tried there next."""
 COLUMNS = ("late_rms_h_dot", "late_rms_theta_dot", "mse_h", "mse_theta", "effort", "total_variation", "peak_force")
 """Metrics of the table."""
 _PERIODS, _ERRORS = 0, 1
@@ -117,6 +121,7 @@ class Push:
     """The largest constant push that all plants stand on an arm's estimate.
 
     Args:
+        case: the name of the initial state.
         arm: its name.
         stood: the largest push tried in N under which none fell; NaN where some fall without any.
         fell: the least push tried in N under which some fell.
@@ -124,6 +129,7 @@ class Push:
         runs: of how many.
     """
 
+    case: str
     arm: str
     stood: float
     fell: float
@@ -134,6 +140,12 @@ class Push:
     def at_most(self) -> float:
         """The 95 % bound (Clopper and Pearson) of the share of plants that fall under ``stood``, of which none did."""
         return float(stats.beta.ppf(0.95, 1, self.runs)) if math.isfinite(self.stood) else math.nan
+
+    @property
+    def surviving(self) -> tuple[float, float]:
+        """The 95 % interval (Clopper and Pearson) of the share of plants that stand ``fell``."""
+        sure = stats.binomtest(self.runs - self.falls, self.runs).proportion_ci(0.95, "exact")
+        return float(sure.low), float(sure.high)
 
 
 def largest_pushes(
@@ -147,7 +159,8 @@ def largest_pushes(
 ) -> list[Push]:
     """Bisect the largest constant force on the cart that no plant falls under, for every arm on the same plants.
 
-    A plant that stands a push is taken to stand smaller ones.
+    A plant that stands a push is taken to stand smaller ones. The first plants alone bound the search from above, as
+    one that falls among few falls among all.
 
     Args:
         place: the upright scenario, of a single controller.
@@ -166,24 +179,42 @@ def largest_pushes(
     )
     (controller,) = place.controllers
 
-    def falls(pushes: dict[str, float]) -> dict[str, int]:
+    def tried(pushes: dict[str, float], plants: int) -> dict[str, int]:
+        """How many fall under a push each."""
         wanted = []
         for name, newtons in pushes.items():
             pushed = place.with_options(disturbance={"kind": "constant", "force": newtons}) if newtons else place
-            wanted += [group for group in groups([pushed], [controller], [name], runs) if group.uncertainty > 0.0]
+            wanted += [group for group in groups([pushed], [controller], [name], plants) if group.uncertainty > 0.0]
+        falls = {outcome.group.arm: int(outcome.failed.sum()) for outcome in measured(wanted, seed)}
         told(1)
-        return {outcome.group.arm: int(outcome.failed.sum()) for outcome in measured(wanted, seed)}
+        return falls
 
-    bare = falls(dict.fromkeys(ARMS, 0.0))
-    found = {name: Push(name, 0.0, math.inf, 0, runs) for name in ARMS}
-    for name, fallen in bare.items():
-        if fallen:
-            found[name] = Push(name, math.nan, 0.0, fallen, runs)
-    while trying := {name: _next(push) for name, push in found.items() if push.fell - push.stood > precision}:
-        for name, fallen in falls(trying).items():
-            push, newtons = found[name], trying[name]
-            found[name] = replace(push, fell=newtons, falls=fallen) if fallen else replace(push, stood=newtons)
-    return list(found.values())
+    def search(found: dict[str, Push], plants: int) -> None:
+        while trying := {name: _next(push) for name, push in found.items() if _open(push, precision)}:
+            for name, falls in tried(trying, plants).items():
+                found[name] = _narrowed(found[name], trying[name], falls, plants)
+
+    bare = tried(dict.fromkeys(ARMS, 0.0), runs)
+    found = {name: Push(case, name, 0.0, math.inf, 0, runs) for name, falls in bare.items() if not falls}
+    hopeless = {name: Push(case, name, math.nan, 0.0, falls, runs) for name, falls in bare.items() if falls}
+    search(found, min(FEW, runs))
+    if found and runs > FEW:
+        near = {name: NEAR * push.fell for name, push in found.items()}
+        for name, falls in tried(near, runs).items():  # what few stand, all need not
+            found[name] = _narrowed(replace(found[name], stood=0.0), near[name], falls, runs)
+        search(found, runs)
+        if of_few := {name: push.fell for name, push in found.items() if push.runs < runs}:
+            for name, falls in tried(of_few, runs).items():
+                found[name] = replace(found[name], falls=falls, runs=runs)
+    return [(hopeless | found)[name] for name in ARMS]
+
+
+def _open(push: Push, precision: float) -> bool:
+    return push.fell - push.stood > precision
+
+
+def _narrowed(push: Push, newtons: float, falls: int, plants: int) -> Push:
+    return replace(push, fell=newtons, falls=falls, runs=plants) if falls else replace(push, stood=newtons)
 
 
 def _next(push: Push) -> float:

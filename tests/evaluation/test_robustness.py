@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from smo_gym.cli import robustness as cli
 from smo_gym.evaluation import metrics, robustness, scenario, study
@@ -47,7 +48,7 @@ def test_errors_count_from_the_time_on_at_which_they_have_settled():
 
 def test_a_push_that_all_stand_is_bracketed():
     upright = scenario.named("upright").changed(horizon=3.0)
-    found = {p.arm: p for p in robustness.largest_pushes(upright, cli.CASE, 6, 0, precision=1.0)}
+    found = {p.arm: p for p in robustness.largest_pushes(upright, cli.CASES[0], 6, 0, precision=1.0)}
     assert set(found) == {*ARMS}
     for name in ("with", "oracle"):
         push = found[name]
@@ -57,11 +58,32 @@ def test_a_push_that_all_stand_is_bracketed():
     assert found["with"].stood < found["oracle"].stood
 
 
+@pytest.mark.parametrize("weakest", ["among the few", "among the others"])
+def test_the_search_finds_the_weakest_of_all_plants_and_counts_all_that_fall(weakest):
+    limits = np.random.default_rng(0).uniform(30.0, 60.0, 200)
+    limits[3 if weakest == "among the few" else 150] = 20.3
+
+    def measured(wanted, seed):
+        pushes = [sum(each.force for each in group.scenario.task.disturbance) for group in wanted]
+        return [
+            study.Outcome(group, {}, np.asarray(limits[: group.runs] < push))
+            for group, push in zip(wanted, pushes, strict=True)
+        ]
+
+    upright = scenario.named("upright")
+    for push in robustness.largest_pushes(upright, cli.CASES[0], len(limits), 0, measured=measured):
+        assert push.stood <= 20.3 < push.fell <= push.stood + 0.05
+        assert (push.falls, push.runs) == ((limits < push.fell).sum(), len(limits))
+        low, high = push.surviving
+        assert low == pytest.approx(stats.beta.ppf(0.025, 199, 2))
+        assert high == pytest.approx(stats.beta.ppf(0.975, 200, 1))
+
+
 def test_where_plants_fall_without_a_push_none_is_stood():
     upright = scenario.named("upright")
-    state = {cli.CASE: (0.0, 1.5, 0.0, 0.0)}
+    state = {cli.CASES[0]: (0.0, 1.5, 0.0, 0.0)}
     hopeless = upright.changed(horizon=2.0, initial_states=state)
-    found = robustness.largest_pushes(hopeless, cli.CASE, 3, 0)
+    found = robustness.largest_pushes(hopeless, cli.CASES[0], 3, 0)
     assert all(math.isnan(p.stood) and p.fell == 0.0 and p.falls > 0 and math.isnan(p.at_most) for p in found)
 
 

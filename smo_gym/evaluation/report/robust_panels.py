@@ -38,12 +38,18 @@ def draw(rows: Sequence[Row], pushes: Sequence[Push]) -> Figure:
             panel.set_xticks(range(len(sensors)), [sensor.replace(" ", "\n", 1) for sensor in sensors], fontsize=7)
         chatter.legend(fontsize=7)
         held = [arm for arm in ARMS.values() if any(each.arm == arm.name for each in pushes)]
-        stood = {each.arm: each.stood for each in pushes}
-        newtons = [0.0 if np.isnan(stood[arm.name]) else stood[arm.name] for arm in held]
-        bars = push.barh(range(len(held)), newtons, color=[arm.colour for arm in held])
-        push.bar_label(bars, [f"{value:.3g}" if value else "none" for value in newtons], fontsize=8, padding=2)
+        stood = {(each.case, each.arm): each.stood for each in pushes}
+        cases = list(dict.fromkeys(each.case for each in pushes))
+        height = 0.8 / len(cases)
+        for k, case in enumerate(cases):
+            newtons = np.nan_to_num([stood[case, arm.name] for arm in held])
+            places = np.arange(len(held)) + (k - 0.5 * (len(cases) - 1)) * height
+            bars = push.barh(places, newtons, 0.9 * height, color=[arm.colour for arm in held], alpha=1.0 - 0.4 * k)
+            start = case.rpartition(" ")[2]
+            said = [f"{value:.3g} from {start}" if value else f"none from {start}" for value in newtons]
+            push.bar_label(bars, said, fontsize=7, padding=2)
         push.set_yticks(range(len(held)), [arm.title.replace(" ", "\n", 1) for arm in held], fontsize=7)
         push.invert_yaxis()
-        push.margins(x=0.15)
-        push.set_title("largest push all stand, N")
+        push.margins(x=0.4)
+        push.set_title("largest push all stand, N, by theta(0), rad")
     return figure
