@@ -33,7 +33,7 @@ SETTLED = 2000
 """Control periods before the errors of a velocity count: 2 s at the article's 1 ms."""
 FEW = 50
 """Plants, the first ones, that bound the search for the largest push from above."""
-NEAR = 0.9
+NEAR = 0.95
 """Of the least push under which some of the few fall: all are tried there next."""
 COLUMNS = ("late_rms_h_dot", "late_rms_theta_dot", "mse_h", "mse_theta", "effort", "total_variation", "peak_force")
 """Metrics of the table."""
@@ -153,7 +153,7 @@ def largest_pushes(
     case: str,
     runs: int,
     seed: int,
-    precision: float = 0.05,
+    precision: float = 0.1,
     measured: Measure = measure,
     told: Callable[[int], Any] = lambda rounds: None,
 ) -> list[Push]:

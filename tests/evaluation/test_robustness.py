@@ -72,7 +72,7 @@ def test_the_search_finds_the_weakest_of_all_plants_and_counts_all_that_fall(wea
 
     upright = scenario.named("upright")
     for push in robustness.largest_pushes(upright, cli.CASES[0], len(limits), 0, measured=measured):
-        assert push.stood <= 20.3 < push.fell <= push.stood + 0.05
+        assert push.stood <= 20.3 < push.fell <= push.stood + 0.1
         assert (push.falls, push.runs) == ((limits < push.fell).sum(), len(limits))
         low, high = push.surviving
         assert low == pytest.approx(stats.beta.ppf(0.025, 199, 2))

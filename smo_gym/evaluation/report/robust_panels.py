@@ -46,10 +46,10 @@ def draw(rows: Sequence[Row], pushes: Sequence[Push]) -> Figure:
             places = np.arange(len(held)) + (k - 0.5 * (len(cases) - 1)) * height
             bars = push.barh(places, newtons, 0.9 * height, color=[arm.colour for arm in held], alpha=1.0 - 0.4 * k)
             start = case.rpartition(" ")[2]
-            said = [f"{value:.3g} from {start}" if value else f"none from {start}" for value in newtons]
+            said = [f"{value:.3g} from {start} rad" if value else f"none from {start} rad" for value in newtons]
             push.bar_label(bars, said, fontsize=7, padding=2)
         push.set_yticks(range(len(held)), [arm.title.replace(" ", "\n", 1) for arm in held], fontsize=7)
         push.invert_yaxis()
-        push.margins(x=0.4)
-        push.set_title("largest push all stand, N, by theta(0), rad")
+        push.margins(x=0.55)
+        push.set_title("largest push all stand, N")
     return figure
