@@ -50,6 +50,8 @@ class Part:
             true one.
         xhat: of an observer, the estimate that it begins with, (4, n); None for [y, 0, 0].
         alike: numbers that must be the same in all slots that share a call of these blocks.
+        period: of an observer, the row of its own that holds the time in s since the sample before; None where it does
+            not need it. Whoever has samples that are not evenly spaced sets it before each.
     """
 
     rows: Array
@@ -59,11 +61,21 @@ class Part:
     xhat: Array | None = None
     alike: tuple[float, ...] = ()
     reads: bool = False
+    period: int | None = None
 
     @property
     def kind(self) -> tuple[Any, ...]:
         """What two parts must have in common to be one: blocks, number of rows and what is alike."""
-        return (self.act, self.sample, self.close, len(self.rows), self.xhat is None, self.alike, self.reads)
+        return (
+            self.act,
+            self.sample,
+            self.close,
+            len(self.rows),
+            self.xhat is None,
+            self.alike,
+            self.reads,
+            self.period,
+        )
 
 
 def columns(n: int, *groups: Any) -> Array:
@@ -90,6 +102,7 @@ def side_by_side(parts: Iterable[Part]) -> list[Part]:
             None if group[0].xhat is None else np.hstack([part.xhat for part in group if part.xhat is not None]),
             group[0].alike,
             group[0].reads,
+            group[0].period,
         )
         for group in found
     ]
@@ -181,6 +194,10 @@ class Loop:
         vars(self).update(state)
         self._sections = self._programs()
         self._show()
+
+    def place(self, role: str) -> slice:
+        """Where a part's own rows are."""
+        return self._own[role]
 
     def own(self, role: str) -> Array:
         """A part's own rows, (rows, n)."""

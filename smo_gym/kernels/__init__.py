@@ -68,10 +68,10 @@ def plain(function: F) -> F:
     return cast(F, getattr(function, "py_func", function))
 
 
-def kernel(function: F) -> F:
+def kernel(function: F, on_disk: bool = True) -> F:
     """Compile a loop over a batch; it runs without the GIL and is cached on disk (:mod:`smo_gym.kernels.cache`)."""
     dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    if COMPILES:
+    if COMPILES and on_disk:
         try:
             dispatcher._cache = Cache(dispatcher.py_func)
         except Exception as error:  # no folder to cache in, or another Numba keeps its cache elsewhere

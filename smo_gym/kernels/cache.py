@@ -16,6 +16,18 @@ def _digest() -> str:
 
 
 _SOURCES = _digest()
+
+
+def _named(value: Any) -> Any:
+    """What tells a function apart from others that are compiled from the same lines: what it closes over, by name."""
+    function = getattr(value, "py_func", value)
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return repr(value)
+    closed = tuple(_named(cell.cell_contents) for cell in function.__closure__ or ())
+    return function.__module__, function.__qualname__, code.co_code, repr(code.co_consts), closed
+
+
 _warned: set[str] = set()
 
 
@@ -41,6 +53,10 @@ class Cache(FunctionCache):
         super().__init__(function)  # type: ignore[no-untyped-call]
         index = self._cache_file
         index._source_stamp = (index._source_stamp, _SOURCES)
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """Numba's own key has the pickle of what a function closes over; that of a compiled function is never the same."""
+        return sig, codegen.magic_tuple(), hashlib.sha256(repr(_named(self._py_func)).encode()).hexdigest()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled kernel, or None where there is none that can be read."""

@@ -7,11 +7,14 @@ from itertools import groupby
 from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..loop import Loop, Part, runs_as_part, side_by_side
+from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array, Flags
 from .protocol import Compiled, Estimator, Observer
+from .recorded import run
 
 
 class Compiling:
@@ -19,9 +22,20 @@ class Compiling:
 
     __slots__ = ()
 
-    def start(self: Compiled, n: int, dt: float, force: float, nominal: CartPendulum) -> BlockEstimator:
+    def start(self: Compiled, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> BlockEstimator:
         """An estimator of n slots; arguments and errors as of :meth:`~smo_gym.observers.protocol.Observer.start`."""
         return BlockEstimator([self.part(n, dt, force, nominal)], n)
+
+    def run(
+        self: Compiled,
+        t: ArrayLike,
+        y: ArrayLike,
+        u: ArrayLike,
+        model: Model | CartPendulum | None = None,
+        force: float | None = None,
+    ) -> Array:
+        """Estimates along a recording, (samples, 4): :func:`~smo_gym.observers.recorded.run`."""
+        return run(self, t, y, u, model, force)
 
 
 class BlockEstimator:
@@ -42,11 +56,25 @@ class BlockEstimator:
         x = np.concatenate([y, np.zeros_like(y)])
         self._loop.start(slots, x[:, slots])
 
-    def update(self, samples: Array, u: Array) -> None:
-        """Bring the estimates to the end of a control period."""
+    def update(self, samples: Array, u: Array, elapsed: float | None = None) -> None:
+        """Bring the estimates to the end of a control period.
+
+        Samples are evenly spaced as :meth:`~smo_gym.observers.protocol.Observer.start` was told, or ``elapsed`` seconds
+        apart.
+        """
+        if elapsed is not None:
+            self._space(elapsed)
         self._loop.substeps = len(samples)
         self._loop.u[:] = u
         self._loop.run(recording=np.ascontiguousarray(samples))
+
+    def _space(self, elapsed: float) -> None:
+        own, start = self._loop.own("observer"), 0
+        for part in self._parts:
+            stop = start + part.rows.shape[1]
+            if part.period is not None:
+                own[part.period, start:stop] = elapsed
+            start = stop
 
 
 class Several:
@@ -83,7 +111,9 @@ def _runs(observers: Sequence[Observer]) -> list[tuple[Observer, int]]:
     return [(run[0], len(run)) for run in runs]
 
 
-def parts_of(observers: Sequence[Observer], dt: float, force: float, nominal: CartPendulum) -> list[Part] | None:
+def parts_of(
+    observers: Sequence[Observer], dt: float, force: float, nominal: Model | CartPendulum
+) -> list[Part] | None:
     """What observers, one a slot, put into a loop, equal kinds as one; None where one of them is not compiled.
 
     Raises:
@@ -95,7 +125,7 @@ def parts_of(observers: Sequence[Observer], dt: float, force: float, nominal: Ca
     return side_by_side(cast(Compiled, observer).part(n, dt, force, nominal) for observer, n in runs)
 
 
-def start_each(observers: Sequence[Observer], dt: float, force: float, nominal: CartPendulum) -> Estimator:
+def start_each(observers: Sequence[Observer], dt: float, force: float, nominal: Model | CartPendulum) -> Estimator:
     """An estimator whose slot i is ``observers[i]``'s, of any kinds.
 
     Raises:

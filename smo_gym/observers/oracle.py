@@ -6,6 +6,7 @@ import numpy as np
 
 from ..kernels.blocks import XHAT, X, block, four, put_four
 from ..loop import Part
+from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array, Flags
 
@@ -20,11 +21,11 @@ def _look(signals: Array, own: Array, lanes: int) -> None:
 class Oracle:
     """xhat = x at every control instant."""
 
-    def part(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Part:
+    def part(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Part:
         """What an oracle puts into a loop that has a plant; any sampling period, force and plant will do."""
         return Part(np.empty((0, n)), sample=_look)
 
-    def start(self, n: int, dt: float, force: float, nominal: CartPendulum) -> "_Truth":
+    def start(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> "_Truth":
         """An oracle for n slots, which must be shown the states."""
         return _Truth(n)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol, runtime_checkable
 
 from ..loop import Part
+from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array, Flags
 
@@ -43,7 +44,7 @@ class SeesTruth(Protocol):
 class Observer(Protocol):
     """The settings of an observer, constant while it works."""
 
-    def start(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Estimator:
+    def start(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Estimator:
         """An estimator of n slots for positions sampled every ``dt`` seconds and forces of at most ``force`` N.
 
         ``nominal`` is the plant without uncertainty, all that an observer may know of the plants.
@@ -58,6 +59,6 @@ class Observer(Protocol):
 class Compiled(Protocol):
     """An observer whose work is a block, so that it runs inside of the compiled loop."""
 
-    def part(self, n: int, dt: float, force: float, nominal: CartPendulum) -> Part:
+    def part(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Part:
         """What the observer puts into a loop of n slots; arguments and errors as of :meth:`Observer.start`."""
         ...
