@@ -18,6 +18,7 @@ from .friction import Friction
 from .kernels import plain
 from .kernels.cart_pendulum import answer
 from .observers import Gains, SlidingModeObserver
+from .observers.sliding_mode import Slopes
 from .plant import CartPendulum
 from .typing import Array, Flags
 from .validation import array, number
@@ -207,23 +208,23 @@ def design(over: OperatingSet, margin: float = 0.1) -> Gains:
     return Gains(m1=(m1, m1), beta_1=(drift, drift), beta_2=(gain, gain))
 
 
-def stable(gains: Gains, slopes: tuple[float, float], dt: float, force: float) -> SlidingModeObserver:
+def stable(gains: Gains, slopes: Slopes, dt: float, force: float) -> SlidingModeObserver:
     """An observer with these gains and the longest step that divides the sampling period and is stable (RK4)."""
     observer = SlidingModeObserver(gains=gains, slopes=slopes)
     return SlidingModeObserver(gains=gains, slopes=slopes, step=dt / math.ceil(dt / observer.largest_step(force)))
 
 
-def layer(speed: ArrayLike, m1: ArrayLike, slope: float) -> Array:
+def layer(speed: ArrayLike, m1: ArrayLike, slope: ArrayLike) -> Array:
     """Half-width of the boundary layer of the positions, atanh(|X2| / m1) / k_p, where m1 tanh(k_p e) = |X2|.
 
     Infinite where ``m1 <= |X2|``.
     """
     ratio = np.minimum(np.abs(np.asarray(speed)) / np.asarray(m1), 1.0)
     with np.errstate(divide="ignore"):
-        return np.asarray(np.arctanh(ratio) / slope)
+        return np.asarray(np.arctanh(ratio) / np.asarray(slope))
 
 
-def position_bound(speed: ArrayLike, m1: ArrayLike, slope: float, kappa: ArrayLike) -> Array:
+def position_bound(speed: ArrayLike, m1: ArrayLike, slope: ArrayLike, kappa: ArrayLike) -> Array:
     """What holds with tanh: |e(t)| <= atanh((V + kappa) / m1) / k_p from t = |e(0)| / kappa on, 0 < kappa < m1 - V.
 
     Outside of it m1 tanh(k_p |e|) > V + kappa, so that |e| falls faster than kappa; inside, it cannot come out.
@@ -248,7 +249,7 @@ def velocity_bound(observer: SlidingModeObserver, over: OperatingSet, force: flo
     Infinite where a gain does not exceed its supremum.
     """
     gains, bounds = Gains.of(observer.gains), suprema(over)
-    slope_p, slope_v = observer.slopes
+    slope_p, slope_v = map(np.asarray, observer.slopes)
     m1, speed = np.array(gains.m1), bounds.speed
     rate = slope_p * (m1 - speed**2 / m1)
     with np.errstate(divide="ignore"):

@@ -55,7 +55,7 @@ class Cache(FunctionCache):
         index._source_stamp = (index._source_stamp, _SOURCES)
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
-        """Numba's own key has the pickle of what a function closes over; that of a compiled function is never the same."""
+        """Without a pickle of what a function closes over, which for a compiled function is new in each process."""
         return sig, codegen.magic_tuple(), hashlib.sha256(repr(_named(self._py_func)).encode()).hexdigest()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

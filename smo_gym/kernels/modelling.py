@@ -36,7 +36,8 @@ def _gathered(count: int) -> Params:
 def for_each_model(make: Callable[..., Block]) -> Callable[..., Block]:
     """``make(rhs, params, *options)`` as ``made(rhs, number of params, *options)``, compiled once for each.
 
-    Cached on disk where all functions among these are this package's own: what others use may change without their file.
+    Cached on disk where all functions among these are this package's own: what others use may
+    change without their file.
     """
 
     @cache

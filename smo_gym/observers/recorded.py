@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.blocks import U, Y0, Y, address
+from ..kernels.blocks import address
 from ..kernels.replay import replay
 from ..loop import Loop
 from ..models import Model
