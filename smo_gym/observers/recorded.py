@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..kernels.batch import for_slots
 from ..kernels.blocks import address
 from ..kernels.replay import replay
-from ..loop import Loop
+from ..loop import Loop, Part
 from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array
@@ -18,6 +17,8 @@ from .protocol import Compiled
 
 _JITTER = 1e-6
 """Periods that differ by less than this share from their median are taken as that: stamps are rounded numbers."""
+
+_MICROSECONDS_A_SAMPLE = 0.05  # of one slot: decides when a second thread is worth waking
 
 
 def periods(t: Array) -> tuple[float, Array]:
@@ -54,15 +55,31 @@ def run(
     """
     times, positions, inputs = _checked(t, y, u)
     dt, h = periods(times)
-    part = observer.part(1, dt, float(np.abs(inputs).max()) if force is None else force, model or CartPendulum())
-    loop = Loop(1, 1, {"observer": part})
-    loop.start(slice(None), np.array([[*positions[0], 0.0, 0.0]]).T)
-    xhat = np.empty((len(times), 4))
-    xhat[0] = loop.xhat[:, 0]
-    if part.sample is not None:
-        own = loop.place("observer")
-        period: Any = -1 if part.period is None else part.period
-        replay(loop.rows, address(part.sample), own.start, own.stop, period, h, positions, inputs, xhat)
+    largest = float(np.abs(inputs).max()) if force is None else force
+    part = observer.part(1, dt, largest, model or CartPendulum())
+    return along(part, h, positions[:, :, None], inputs[:, None])[:, :, 0]
+
+
+def along(part: Part, h: Array, y: Array, u: Array) -> Array:
+    """Estimates of n slots along recordings of as many samples, (samples, 4, n).
+
+    Args:
+        part: what the observer puts into a loop of n slots.
+        h: time since the sample before in s, (samples,).
+        y: measured positions, (samples, 2, n).
+        u: input from each sample to the next, (samples, n).
+    """
+    n = y.shape[2]
+    loop = Loop(n, 1, {"observer": part})
+    loop.start(slice(None), np.concatenate([y[0], np.zeros((2, n))]))
+    xhat = np.empty((len(y), 4, n))
+    xhat[0] = loop.xhat
+    if part.sample is None:
+        xhat[1:] = loop.xhat
+        return xhat
+    place, period = loop.place("observer"), -1 if part.period is None else part.period
+    whole = loop.rows, address(part.sample), place.start, place.stop, period
+    for_slots(replay, 0, n, _MICROSECONDS_A_SAMPLE * len(y), *whole, h, y, u[:, None], xhat)
     return xhat
 
 
