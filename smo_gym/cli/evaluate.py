@@ -23,7 +23,7 @@ from tqdm import tqdm
 from .. import files, presets
 from ..article import WITH, WITHOUT
 from ..evaluation import configs, formats, scenario, study
-from ..evaluation.arms import ARMS, EVERY, PRINTED, SMO
+from ..evaluation.arms import ARMS, EVERY, PRINTED, SMO, register, tuned
 from ..evaluation.between import lines
 from ..evaluation.report import answer, figures, page, tables
 from ..evaluation.statistics import Result, results
@@ -152,7 +152,10 @@ def chosen_arms(observer: str, compensation: str | None) -> list[str]:
         ValueError: no arm has such an observer, or compensation is asked of one that has no such switch.
     """
     others = [name for name in ARMS if name not in PRINTED]
-    if choice("observer", observer, (SMO, *others, EVERY)) in others:
+    if observer not in others and observer in tuned():
+        register(tuned()[observer])
+        others.append(observer)
+    if choice("observer", observer, (SMO, *others, *tuned(), EVERY)) in others:
         if compensation is not None:
             raise ValueError(f"--compensation {compensation} is for the observer smo, not --observer {observer}")
         return [observer]

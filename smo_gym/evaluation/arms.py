@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import colorsys
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 
 from gymnasium.vector import VectorEnv
 
@@ -14,6 +16,7 @@ from ..observers import Observer, Oracle
 from ..typing import Array
 from ..validation import choice
 from ..wrappers import VectorObserverWrapper
+from . import candidates
 from .scenario import Scenario
 from .settings import ObserverSettings
 
@@ -50,6 +53,8 @@ class Arm:
     colour_on_dark: str
     observer: Made
     designed: bool = False
+    settings: str = ""
+    """What its observer is made with besides, as text: a stored group depends on it."""
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
@@ -115,7 +120,35 @@ def arm(name: str) -> Arm:
     Raises:
         ValueError: there is none of this name, with a suggestion.
     """
-    return ARMS[choice("arm", name, ARMS)]
+    known = ARMS if name in ARMS else {**ARMS, **tuned()}
+    return known[choice("arm", name, known)]
+
+
+@cache
+def tuned() -> dict[str, Arm]:
+    """An arm for each observer that was tuned on simulated encoders, by name; none of them is in ``all``."""
+    found = candidates.named("simulated").observers
+    n = len(found)
+    return {
+        name: Arm(
+            name,
+            candidate.title,
+            _hue(i / n, 0.35),
+            _hue(i / n, 0.7),
+            partial(_build, candidate),
+            settings=candidate.model_dump_json(),
+        )
+        for i, (name, candidate) in enumerate(found.items())
+    }
+
+
+def _build(candidate: candidates.Candidate, settings: ObserverSettings, scenario: Scenario, task: Task) -> Observer:
+    return candidate.build()
+
+
+def _hue(hue: float, lightness: float) -> str:
+    red, green, blue = colorsys.hls_to_rgb(hue, lightness, 0.6)
+    return f"#{round(255 * red):02X}{round(255 * green):02X}{round(255 * blue):02X}"
 
 
 def _designed(settings: ObserverSettings, scenario: Scenario, task: Task) -> Observer:

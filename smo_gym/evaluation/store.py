@@ -73,7 +73,8 @@ class Store:
         hash can be relied on.
         """
         scenario, settings = group.scenario, group.settings
-        makers = [arm(group.arm).observer, *(meter.finish for meter in metrics.METERS.values())]
+        maker = arm(group.arm).observer
+        makers = [getattr(maker, "func", maker), *(meter.finish for meter in metrics.METERS.values())]
         if "disturbance" in scenario.options and any(each.function for each in scenario.task.disturbance):
             return None
         if not _is_ours(scenario.environment) or not all(maker.__module__.startswith("smo_gym.") for maker in makers):
@@ -93,7 +94,7 @@ class Store:
             "scenario": scenario.model_dump(mode="json", exclude={"controllers"}),
             "reference": None if reference is None else reference.to_json(),
             "settings": settings.model_dump(mode="json"),
-            "group": [group.controller, group.uncertainty, group.case, group.arm, group.runs],
+            "group": [group.controller, group.uncertainty, group.case, group.arm, group.runs, arm(group.arm).settings],
             "study": [seed, samples],
             "policy": policy,
             "environment": [str(spec.entry_point), str(spec.vector_entry_point), spec.max_episode_steps],

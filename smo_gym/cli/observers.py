@@ -1,0 +1,139 @@
+"""All observers, tuned alike: on simulated encoders, or on recordings of real ones.
+
+    smo-gym observers                        # sensors x levels of uncertainty, on the same trajectories and in the loop
+    smo-gym observers --data DIR --out OUT   # recordings of two real rigs, and how well each velocity is estimated
+
+Prints, and writes to --out, the errors of both velocities, with 95 % intervals over runs.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import astuple, fields
+from pathlib import Path
+
+from tabulate import tabulate
+from tqdm import tqdm
+
+from .. import files
+from ..evaluation import candidates, formats, observing, robustness
+from ..evaluation.observing import Row
+from ..evaluation.report import figures, observer_panels
+from ..evaluation.store import FOLDER, Store
+from ..evaluation.study import simulated_seconds
+from . import computing
+from .arguments import Parser, one_of, several
+from .entry import command
+
+RESULTS = ("observers.csv", "observers.md")
+FIGURE = "observers"
+
+
+@command("observers")
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Measure; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
+    parser = Parser("observers", __doc__)
+    parser.add_argument("--data", type=Path, metavar="DIR", help="folder of recordings; simulated encoders by default")
+    parser.add_argument("--observer", default=None, metavar="NAME", help="some of them (default: all)", **several(str))
+    parser.add_argument(
+        "--sensor",
+        default=[*observing.SENSORS],
+        metavar="NAME",
+        help=f"of {', '.join(observing.SENSORS)} (default: all)",
+        **several(one_of("sensor", [*observing.SENSORS])),
+    )
+    parser.runs(200, "random plants at each level of uncertainty")
+    parser.seed("the random plants and noise")
+    parser.add_argument("--figure", action="store_true", help="draw it, as PDF and PNG into DIR")
+    parser.out("observers")
+    computing.add(parser)
+    args = parser.parse_args(arguments)
+    return _simulated(args)
+
+
+def chosen(known: candidates.Candidates, names: Sequence[str] | None) -> dict[str, candidates.Candidate]:
+    """Some candidates, or all.
+
+    Raises:
+        ValueError: there is none of a name.
+    """
+    return {name: known[name] for name in names or known.observers}
+
+
+def _simulated(args: argparse.Namespace) -> int:
+    observers = chosen(candidates.named("simulated"), args.observer)
+    drawings = [f"{FIGURE}.{form}" for form in figures.FORMATS] if args.figure else []
+    groups = observing.wanted([*observers], args.sensor, observing.LEVELS, args.runs)
+    with (
+        files.claimed(args.out, (*RESULTS, *drawings)) as out,
+        computing.computing(args, out) as measure,
+        robustness.late_errors(),
+    ):
+        seconds = args.runs * observing.HORIZON
+        total = simulated_seconds(groups) + len(groups) * seconds
+        with tqdm(total=total, unit="s", unit_scale=True, desc="simulated", leave=False, disable=None) as bar:
+            rows = [
+                *observing.open_loop(
+                    observers,
+                    args.sensor,
+                    observing.LEVELS,
+                    args.runs,
+                    args.seed,
+                    Store(out / FOLDER),
+                    lambda done: bar.update(done * seconds),
+                )
+            ]
+            outcomes = measure(groups, args.seed, bar.update)
+        sensors = [sensor for sensor in args.sensor for _ in observing.LEVELS for _ in observers]
+        for sensor, outcome in zip(sensors, outcomes, strict=True):
+            rows += observing.closed(sensor, outcome)
+        speed = {name: observing.nanoseconds(candidate) for name, candidate in observers.items()}
+        made: dict[str, str | bytes] = {
+            RESULTS[0]: _csv(rows, speed),
+            RESULTS[1]: "\n\n".join(_tables(rows, speed, "github")) + "\n",
+        }
+        if args.figure:
+            figure = observer_panels.draw(rows, [*observers], observing.LEVELS[-1])
+            made |= {f"{FIGURE}.{form}": figures.encode(figure, form) for form in figures.FORMATS}
+        try:
+            files.write_set(out, made)
+        finally:  # what cannot be written can be read at least
+            print("\n\n".join(_tables(rows, speed, "simple")))
+    print(f"\nresults are in {args.out}")
+    return 0
+
+
+def _csv(rows: Sequence[Row], speed: dict[str, float]) -> str:
+    header = [*(field.name for field in fields(Row)), "ns"]
+    return formats.as_csv(header, [(*astuple(row), speed[row.observer]) for row in rows])
+
+
+def _tables(rows: Sequence[Row], speed: dict[str, float], form: str) -> list[str]:
+    """A table for each loop at the largest level: an observer a line, a sensor a column."""
+    level = max(row.uncertainty for row in rows)
+    found = []
+    for loop, title in (
+        ("open", "on the same trajectories: RMS errors of h' in m/s and theta' in rad/s after 2 s"),
+        ("closed", f"each in the loop of {observing.LAW.upper()}: the same, and runs that failed"),
+    ):
+        mine = [row for row in rows if (row.loop, row.uncertainty) == (loop, level)]
+        sensors = list(dict.fromkeys(row.sensor for row in mine))
+        lines = [
+            (
+                name,
+                *(_cell([row for row in mine if (row.observer, row.sensor) == (name, s)]) for s in sensors),
+                f"{speed[name]:.0f}",
+            )
+            for name in dict.fromkeys(row.observer for row in mine)
+        ]
+        header = ("observer", *sensors, "ns")
+        told = tabulate(lines, header, form, disable_numparse=True)
+        found.append(f"Plants uncertain by {level:.0%}, {title}\n\n{told}")
+    return found
+
+
+def _cell(rows: Sequence[Row]) -> str:
+    """Both velocities' errors, and how many runs failed where some did."""
+    errors = " / ".join(f"{row.rmse:.2g}" for row in rows)
+    return errors + (f" ({rows[0].failed} lost)" if rows[0].failed else "")
