@@ -18,6 +18,7 @@ COMMANDS = {
     "upright": "how often the upright plant falls",
     "robustness": "real encoders, and the largest push that the upright plant stands",
     "observers": "a dozen observers and more, on simulated encoders and on recordings of real ones",
+    "observe": "estimate velocities of a plant of your own from a CSV file",
     "tune": "tune observers, all with the same budget",
     "consistency": "the article's averages and reductions against its own cells",
     "identify": "recover what the article does not print",

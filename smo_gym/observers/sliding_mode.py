@@ -18,7 +18,7 @@ from ..loop import Part, columns
 from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array
-from ..validation import array, choice, multiple, number, shape_of, short, switch
+from ..validation import array, choice, multiple, number, shape_of, short, switch, whole
 from .estimator import Compiling
 from .gains import Gains
 
@@ -74,6 +74,7 @@ class SlidingModeObserver(Compiling):
         injection: "34", or "26" for Xhat1' = Xhat2 + m1 S(X1 - Xhat1) as (26) has it; (33) and (40) are of "34".
         scheme: "rk4" or "implicit".
         measurement: X1 within a period, on the "line" between its samples, held at the "new" or at the "old" one.
+        substeps: integration steps in a sampling period, in place of ``step``.
         schedule: factors of (m1_h, m1_theta, m2_h, m2_theta) as an inlined function of xhat's four numbers (Remark 1);
             None for constant gains.
 
@@ -91,6 +92,7 @@ class SlidingModeObserver(Compiling):
     injection: str = "34"
     scheme: str = "rk4"
     measurement: str = "line"
+    substeps: int | None = None
     schedule: Schedule | None = None
 
     def __post_init__(self) -> None:
@@ -113,6 +115,8 @@ class SlidingModeObserver(Compiling):
             )
         if self.step is not None:
             object.__setattr__(self, "step", number("step", self.step, above=0.0))
+        if self.substeps is not None and (whole("substeps", self.substeps, 1) and self.step is not None):
+            raise ValueError(f"substeps={self.substeps!r} and step={self.step!r} say the same: give one")
 
     def largest_step(self, force: float) -> float:
         """The largest step in s at which RK4 is stable inside both boundary layers while ``|u| <= force``.
@@ -157,14 +161,14 @@ class SlidingModeObserver(Compiling):
 
     def _steps(self, dt: float, force: float) -> int:
         """How many integration steps a sampling period has."""
-        step = dt if self.step is None else self.step
-        steps = multiple("sampling period", dt, "step", step)
+        step = dt / self.substeps if self.substeps else dt if self.step is None else self.step
+        steps = self.substeps or multiple("sampling period", dt, "step", step)
         largest = self.largest_step(force)
         if step > largest:
             raise ValueError(
                 f"step={step:g} s is too large for these gains and slopes with |u| up to {force:g} N: RK4 is stable up "
-                f"to {largest:.4g} s; the largest step that divides the sampling period is "
-                f"step={dt / math.ceil(dt / largest)!r}"
+                f"to {largest:.4g} s, with substeps={math.ceil(dt / largest)}; the largest step that divides the sampling "
+                f"period is step={dt / math.ceil(dt / largest)!r}"
             )
         return steps
 
