@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from tabulate import tabulate
 
@@ -53,3 +53,8 @@ class Told:
         """A table, and what follows it."""
         self.whole += tabulate(rows, header, disable_numparse=True) + end
         self.shown += table(header, rows) + end.lstrip(" ")
+
+
+def pair(values: Iterable[float]) -> str:
+    """Two numbers to read."""
+    return ", ".join(f"{value:.3g}" for value in values)

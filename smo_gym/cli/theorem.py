@@ -12,6 +12,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -29,7 +30,7 @@ from .. import (
     files,
     theorem,
 )
-from ..evaluation import configs, rollout, scenario, store
+from ..evaluation import configs, rollout, scenario, store, theorem_sweep
 from ..evaluation.scenario import Scenario, TheoremSettings
 from ..evaluation.theorem_on_runs import SHARES, Convergence
 from ..evaluation.theorem_pieces import converge_in_pieces
@@ -37,10 +38,11 @@ from ..evaluation.traces import Traces
 from . import narrow
 from .arguments import Parser
 from .entry import command
-from .narrow import Told
+from .narrow import Told, pair
 
 DT = 0.001
 RESULT = "theorem.txt"
+SWEPT, SWEPT_SECONDS = 200, 3.0  # most runs of the sweep; how long they are
 
 
 @command("theorem")
@@ -51,6 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--config", type=Path, default=config, metavar="FILE", help="operating set")
     parser.runs(1000, "random plants, starts")
     parser.seed("the random plants and starts")
+    parser.add_argument("--sweep", action="store_true", help="also how soon it converges, over margin, step and noise")
     parser.out(None, "folder for theorem.txt")
     args = parser.parse_args(arguments)
     settings = scenario.load_theorem(args.config)
@@ -60,6 +63,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         told = Told()
         with store.kept(out) if out else contextlib.nullcontext() as kept:
             answer = parts(told, settings, over, observer, args.runs, args.seed, kept)
+            if args.sweep:
+                remark_2(told, settings, over, min(args.runs, SWEPT), args.seed)
         try:
             if out is not None:
                 files.write(out / RESULT, told.whole)
@@ -226,6 +231,18 @@ def with_tanh(told: Told, found: Convergence, settle: float) -> None:
     )
 
 
+def remark_2(told: Told, settings: TheoremSettings, over: theorem.OperatingSet, count: int, seed: int) -> None:
+    """Tell how soon designed observers converge on the true state's own trajectories."""
+    low, high = np.array(settings.starts.value)
+    starts = theorem_sweep.edge(low, high, count, np.random.default_rng(seed))
+    law: Any = scenario.named("initial-conditions").agent("lqr")
+    given = (over, settings.slopes.value, settings.force.value, law, starts, seed, DT, SWEPT_SECONDS)
+    with tqdm(total=len(theorem_sweep.DESIGNS), unit="design", leave=False, disable=None) as bar:
+        rows = [row.said() for row in theorem_sweep.sweep(*given, told=bar.update)]
+    told.say(f"\nRemark 2 on {count} runs from the edge of the box of starts:\n")
+    told.table(theorem_sweep.HEADER, rows)
+
+
 def along(article: Scenario, controller: str) -> Traces:
     """Runs of Table 5's cases on the nominal plant, with compensation."""
     observer, cases = article.controllers[controller].observer, article.initial_states.value
@@ -276,11 +293,6 @@ def switching(told: Told, article: Scenario, traces: Traces) -> None:
     )
     told.table(header, rows)
     told.say("\ns is a sum of squares: its gradient vanishes on s = 0, where (52) would ask 0 > lambda + delta.")
-
-
-def pair(values: np.ndarray) -> str:
-    """Two numbers to read."""
-    return ", ".join(f"{value:.3g}" for value in values)
 
 
 def said(holds: object) -> str:

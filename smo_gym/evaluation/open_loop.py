@@ -52,7 +52,7 @@ def trajectories(
     Args:
         environment: its id.
         law: a compiled one, for the state [h, theta, h', theta'].
-        state: the initial one, (4,).
+        state: the initial one, (4,), or one a run, (runs, 4).
         level: of uncertainty.
         runs: plants.
         seed: of plants and noise.
@@ -66,7 +66,7 @@ def trajectories(
     )
     task: Any = env.unwrapped.task  # type: ignore[attr-defined]
     plants = [task.params.perturbed(level * draw).as_array() for draw in deviations(seed, runs)]
-    reset: Mapping[str, Any] = {"state": np.tile(state, (runs, 1)), "params": np.array(plants)}
+    reset: Mapping[str, Any] = {"state": np.array(np.broadcast_to(state, (runs, 4))), "params": np.array(plants)}
     env.reset(options={**reset, **({"noise": np.array(noise(seed, runs))} if task.random else {})})
     parts = {"observer": Oracle().part(runs, task.dt, task.force_limit, task.params), "law": law.part(runs)}
     loop = env.unwrapped.loop.with_parts(**parts)  # type: ignore[attr-defined]
