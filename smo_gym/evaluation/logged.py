@@ -83,7 +83,7 @@ def _looks_like_degrees(t: Array, angle: Array) -> str:
     if len(jumps) == 0 or not np.isfinite(angle).all():
         return ""
     if np.any(np.abs(jumps - COUNTS_A_TURN) < 10.0) and np.abs(angle).max() <= COUNTS_A_TURN:
-        return f"wraps by {jumps.max():.0f}"
+        return f"jumps by {jumps.max():.0f}, as one does that wraps at 360"
     h = np.maximum(np.diff(t), 1e-9)
     usual = float(np.percentile(jumps / h, 90))
     if usual > MOST_SPEED:
