@@ -18,7 +18,7 @@ from ..kernels.batch import LANES
 from ..kernels.blocks import XHAT, Y0, U, Y, at, block, four, offsets, put_four, put_two, two
 from ..kernels.cart_pendulum import drift_and_gain
 from ..kernels.elementary import tanh
-from ..kernels.rk4 import rk4
+from ..kernels.rk4 import STABLE, rk4
 from ..loop import Part, columns
 from ..plant import CartPendulum
 from ..typing import Array
@@ -27,8 +27,6 @@ from .estimator import Compiling
 
 # tanh(k e) with a slope this steep is sgn(e) for every e that is not 0, and 0 for e = 0.
 _EXACT = 1e300
-# RK4 is stable for x' = -r x up to r dt = 2.785 (the real root of 1 + z/2 + z^2/6 + z^3/24).
-_RK4_LIMIT = 2.785
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +141,7 @@ class SlidingModeObserver(Compiling):
         m2 = np.array(gains.beta_1) + self.compensation * np.array(gains.beta_2) * force
         rates = [m.max() * k for m, k in zip((m1, m2), self.slopes, strict=True) if math.isfinite(k)]
         fastest = max(rates, default=0.0)
-        return _RK4_LIMIT / fastest if fastest > 0.0 else math.inf
+        return STABLE / fastest if fastest > 0.0 else math.inf
 
     def as_dict(self) -> dict[str, Any]:
         """The settings by name, of plain types, as the constructor takes them."""
