@@ -20,7 +20,7 @@ from ..plant import CartPendulum
 from ..reference import Reference, shipped
 from ..sensors import Sensor
 from ..typing import Array
-from ..validation import array, limit, mapping, multiple, number, shape_of, unknown, whole
+from ..validation import array, limit, mapping, multiple, number, shape_of, short, unknown, whole
 
 _FURTHEST = 10_000  # control instants of a preview: an observation holds four numbers of each
 KEYS = 2**52
@@ -228,9 +228,12 @@ class Task:
         if options.get("state") is not None:
             found["state"] = array("options['state']", options["state"], (4,))
         if options.get("noise") is not None:
-            found["key"] = float(whole("options['noise']", options["noise"], 0))
-            if found["key"] >= KEYS:
-                raise ValueError(f"options['noise']={options['noise']!r} must be less than 2**52")
+            noise = options["noise"]
+            if not isinstance(noise, int | np.integer) or isinstance(noise, bool) or not 0 <= noise < KEYS:
+                raise ValueError(
+                    f"options['noise']={short(noise)} must be a whole number in [0, 2**52), in a batch also one a slot"
+                )
+            found["key"] = float(noise)
         return found
 
     def as_options(self) -> dict[str, Any]:

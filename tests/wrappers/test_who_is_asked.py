@@ -126,6 +126,23 @@ def test_the_oracle_sees_the_truth_in_every_kind_of_batch(make_vec, some, mode):
         assert (told[0] == told[1]).all()
 
 
+def test_part_of_gymnasiums_own_batch_starts_anew_as_part_of_ours(make_vec):
+    mode = gymnasium.vector.AutoresetMode.DISABLED
+    batches = [
+        VectorObserverWrapper(make_vec(3, autoreset_mode=mode)),
+        VectorObserverWrapper(
+            gymnasium.vector.SyncVectorEnv([lambda: gymnasium.make("SMOPendulum-v0")] * 3, autoreset_mode=mode)
+        ),
+    ]
+    for batch in batches:
+        batch.reset(seed=0)
+        batch.step(np.full((3, 1), 5.0))
+    told = [batch.reset(options={"reset_mask": np.array([True, False, False])})[0] for batch in batches]
+    for _ in range(3):
+        assert (told[0] == told[1]).all()
+        told = [batch.step(np.full((3, 1), 5.0))[0] for batch in batches]
+
+
 def test_an_agent_that_is_to_see_the_state_sees_it_in_subprocesses_and_loops():
     told = []
     for mode in ("vector_entry_point", "sync"):
