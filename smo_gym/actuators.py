@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from .kernels.blocks import ALIVE, FAILED, FORCE, U, at, block, offsets, put
 from .kernels.elementary import rounded
 from .loop import Part, columns
 from .typing import Array
-from .validation import mapping, number, short, switch, whole
+from .validation import instance, number, short, switch, whole
 
 LIMIT, REFUSED, ASKED, COMMAND, PLACE, RAMP, LAG, SETTINGS, REGISTER = offsets(1, 1, 1, 1, 1, 1, 1, 7)
 RESOLUTION, MOST, DELAY, DEAD_ZONE, STEP, KEPT, MEAN = range(SETTINGS, REGISTER)
@@ -209,9 +209,7 @@ class Actuator:
         Raises:
             ValueError: an unknown field, or a value that is not allowed.
         """
-        if isinstance(actuator, Actuator):
-            return actuator
-        return cls(**mapping("actuator setting", {} if actuator is None else actuator, [f.name for f in fields(cls)]))
+        return instance(cls, "actuator setting", actuator)
 
     @property
     def ideal(self) -> bool:

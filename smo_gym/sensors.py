@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from .kernels.blocks import Y0, X, Y, block, put_two, two
 from .kernels.sensing import KEY as KEY
 from .loop import Part, columns
 from .typing import Array
-from .validation import mapping, multiple, number, shape_of, short, whole
+from .validation import instance, multiple, number, shape_of, short, whole
 
 Pair = tuple[float, float]
 Counts = tuple[int, int]
@@ -106,9 +106,7 @@ class Sensor:
         Raises:
             ValueError: an unknown field, or a value that is not allowed.
         """
-        if isinstance(sensor, Sensor):
-            return sensor
-        return cls(**mapping("sensor setting", {} if sensor is None else sensor, [f.name for f in fields(cls)]))
+        return instance(cls, "sensor setting", sensor)
 
     def __post_init__(self) -> None:
         for name in ("scale", "bias", "dead_zone"):

@@ -20,7 +20,7 @@ from ..plant import CartPendulum
 from ..reference import Reference, shipped
 from ..sensors import Sensor
 from ..typing import Array
-from ..validation import array, limit, mapping, multiple, number, shape_of, short, unknown, whole
+from ..validation import array, instance, limit, multiple, number, shape_of, short, unknown, whole
 
 _FURTHEST = 10_000  # control instants of a preview: an observation holds four numbers of each
 KEYS = 2**52
@@ -58,9 +58,7 @@ class Reward:
     @classmethod
     def of(cls, reward: Reward | Mapping[str, Any] | None) -> Reward:
         """Weights from weights, a mapping of field names or None (the defaults)."""
-        if isinstance(reward, Reward):
-            return reward
-        return cls(**mapping("reward weight", reward or {}, [f.name for f in fields(cls)]))
+        return instance(cls, "reward weight", reward)
 
 
 @dataclass(frozen=True, slots=True)
