@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,14 +15,15 @@ from .kernels.blocks import ALIVE, FAILED, FORCE, U, at, block, offsets, put
 from .kernels.elementary import rounded
 from .loop import Part, columns
 from .typing import Array
-from .validation import mapping, number, short, switch, whole
+from .validation import instance, number, short, switch, whole
 
-LIMIT, REFUSED, ASKED, COMMAND, PLACE, RAMP, LAG, SETTINGS, REGISTER = offsets(1, 1, 1, 1, 1, 1, 1, 6)
-RESOLUTION, DELAY, DEAD_ZONE, STEP, KEPT, MEAN = range(SETTINGS, REGISTER)
+LIMIT, REFUSED, ASKED, COMMAND, PLACE, RAMP, LAG, SETTINGS, REGISTER = offsets(1, 1, 1, 1, 1, 1, 1, 7)
+RESOLUTION, MOST, DELAY, DEAD_ZONE, STEP, KEPT, MEAN = range(SETTINGS, REGISTER)
 """Own rows: the force that is asked for and the one of the converter; where in the register the oldest force on its way
-is, behind which the next comes; what rate limit and lag have come to. Then what is alike in all slots: STEP is how far
-the force may go in a sampling period; of its distance from its input the lag has KEPT at the end of one, and MEAN on
-average over it. Last the register: the forces on their way."""
+is, behind which the next comes; what rate limit and lag have come to. Then what is alike in all slots: MOST is the
+converter's largest multiple within the limit, STEP how far the force may go in a sampling period; of its distance from
+its input the lag has KEPT at the end of one, and MEAN on average over it. Last the register: the forces on their
+way."""
 _FINEST = 1e-12  # of a resolution: finer ones are lost in the rounding of float64
 
 
@@ -45,9 +46,15 @@ def limited(n: int, limit: float) -> Part:
     return Part(columns(n, limit, 0.0), act=_limited)
 
 
+@inlined
+def _within(x: float, low: float, high: float) -> float:
+    x = low if x < low else x
+    return high if x > high else x
+
+
 @block
 def _ask(signals: Array, own: Array, lanes: int) -> None:
-    resolution = own[RESOLUTION * LANES]
+    resolution, most = own[RESOLUTION * LANES], own[MOST * LANES]
     for i in range(lanes):
         wanted, limit, alive = at(signals, U, i), at(own, LIMIT, i), at(signals, ALIVE, i) > 0.0
         fine = math.isfinite(wanted)
@@ -60,13 +67,7 @@ def _ask(signals: Array, own: Array, lanes: int) -> None:
         put(own, REFUSED, i, wanted if alive and not fine else at(own, REFUSED, i))
     if resolution > 0.0:
         for i in range(lanes):
-            put(own, COMMAND, i, resolution * rounded(at(own, COMMAND, i) / resolution))
-
-
-@inlined
-def _within(x: float, low: float, high: float) -> float:
-    x = low if x < low else x
-    return high if x > high else x
+            put(own, COMMAND, i, _within(resolution * rounded(at(own, COMMAND, i) / resolution), -most, most))
 
 
 @inlined
@@ -154,7 +155,7 @@ class Actuator:
 
     ::
 
-        resolution      u = the nearest multiple of it
+        resolution      u = the nearest multiple of it         within the limit, too
         delay           u = the one of so many sampling periods ago    0 before the first
         dead zone       u = sgn(u) max(|u| - dead_zone, 0)
         rate limit      u = what is nearest to it within dt rate_limit of the one before, at each sampling instant
@@ -208,9 +209,7 @@ class Actuator:
         Raises:
             ValueError: an unknown field, or a value that is not allowed.
         """
-        if isinstance(actuator, Actuator):
-            return actuator
-        return cls(**mapping("actuator setting", {} if actuator is None else actuator, [f.name for f in fields(cls)]))
+        return instance(cls, "actuator setting", actuator)
 
     @property
     def ideal(self) -> bool:
@@ -239,7 +238,10 @@ class Actuator:
             ratio = dt / self.time_constant
             kept, mean = math.exp(-ratio), -math.expm1(-ratio) / ratio
         step = math.inf if self.rate_limit is None else self.rate_limit * dt
-        settings = (self.resolution or 0.0, float(self.delay), self.dead_zone, step, kept, mean)
+        resolution = self.resolution or 0.0
+        multiples = limit / resolution if resolution else math.inf
+        most = resolution * math.floor(multiples) if multiples < math.inf else math.inf
+        settings = (resolution, most, float(self.delay), self.dead_zone, step, kept, mean)
         rows = columns(n, limit, np.zeros(SETTINGS - REFUSED), settings, np.zeros(self.delay))
         return Part(rows, act=_ask, sample=_reach, close=_restore if self.measured else None, alike=settings)
 

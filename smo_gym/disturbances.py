@@ -65,11 +65,12 @@ class Disturbance:
             each episode draws its own, uniformly.
         torque: size in N m, as ``force``.
         start: in s.
-        frequency: in Hz.
-        phase: in rad.
+        frequency: in Hz; of a sine at most half the sampling rate.
+        phase: in rad, at most a turn either way.
         width: of a pulse in s, at most a period.
         bandwidth: in Hz.
-        function: which Numba can compile.
+        function: which Numba can compile. Globals that it reads are those of its first use, for good: settings that
+            differ between functions belong into a closure.
 
     Raises:
         ValueError: an unknown kind, a value that is not allowed, or one that the kind has no use for.
@@ -96,6 +97,8 @@ class Disturbance:
             raise ValueError(f"disturbance start={self.start!r} must be at least 0")
         if self.ends("frequency")[0] <= 0.0:
             raise ValueError(f"disturbance frequency={self.frequency!r} must be greater than 0")
+        if max(map(abs, self.ends("phase"))) > 2.0 * math.pi:
+            raise ValueError(f"disturbance phase={self.phase!r} must be within a turn, from -2 pi to 2 pi")
         self._check_use()
         if self.kind == "pulses" and self.width * self.ends("frequency")[1] > 1.0:
             raise ValueError(
@@ -155,12 +158,16 @@ class Disturbance:
         """See that it acts in episodes of ``horizon`` seconds which are sampled every ``dt`` seconds.
 
         Raises:
-            ValueError: it begins behind the end, or a pulse is missed between two samples.
+            ValueError: it begins behind the end, or a pulse or half a sine is missed between two samples.
         """
         if self.ends("start")[1] >= horizon:
             raise ValueError(f"disturbance start={self.start!r} s must be less than the horizon={horizon!r} s")
         if self.kind == "pulses" and self.width < dt:
             raise ValueError(f"disturbance width={self.width!r} s must be at least a sampling period dt={dt!r} s")
+        if self.kind == "sine" and self.ends("frequency")[1] > 0.5 / dt:
+            raise ValueError(
+                f"disturbance frequency={self.frequency!r} Hz must be at most {0.5 / dt:g} Hz, half the sampling rate"
+            )
 
 
 def part(disturbances: Sequence[Disturbance], n: int, dt: float) -> Part:

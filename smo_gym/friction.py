@@ -10,12 +10,12 @@ import numpy as np
 from .kernels import inlined
 from .kernels.batch import LANES
 from .kernels.blocks import ALIVE, FAILED, FORCE, PUSH, X, at, block, finite, four, offsets, put, put_four, two
-from .kernels.cart_pendulum import damped
-from .kernels.friction import Forces, cut, uncut
+from .kernels.cart_pendulum import Forces, damped
+from .kernels.friction import cut, uncut
 from .kernels.rk4 import rk4
 from .loop import Part, columns
 from .typing import Array
-from .validation import mapping, number
+from .validation import instance, number
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +52,7 @@ class Friction:
         Raises:
             ValueError: an unknown field, or a value that is not allowed.
         """
-        if isinstance(friction, Friction):
-            return friction
-        return cls(**mapping("friction", {} if friction is None else friction, [field.name for field in fields(cls)]))
+        return instance(cls, "friction", friction)
 
     def __bool__(self) -> bool:
         """Whether there is any."""

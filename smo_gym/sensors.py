@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from .kernels.blocks import Y0, X, Y, block, put_two, two
 from .kernels.sensing import KEY as KEY
 from .loop import Part, columns
 from .typing import Array
-from .validation import mapping, multiple, number, shape_of, short, whole
+from .validation import instance, multiple, number, shape_of, short, whole
 
 Pair = tuple[float, float]
 Counts = tuple[int, int]
@@ -47,6 +47,7 @@ class Sensor:
         jitter          y = x(t_k + tau) = x + tau x'         tau normal, cut at half a sampling period
         scale, bias     y = scale y + bias
         dead zone       y = the last reading outside          while y is in [dead_zone, dead_zone + dead_width)
+                        y = y - n 2 pi (scale - 1)            theta beyond the n-th zone
         stuck           y = the one before                    for stuck_samples samples, with probability stuck
         noise           y = y + (noise + speed_noise |x'|) w  w standard normal, white, of each channel its own
         resolution      y = the nearest multiple of it
@@ -60,8 +61,9 @@ class Sensor:
     Args:
         scale: factor of the position, 1 for none.
         bias: in units.
-        dead_zone: where a potentiometer's gap begins, as a reading in units; that of theta is met in every turn.
-        dead_width: width of the gap in units, 0 for none; that of theta is less than a turn.
+        dead_zone: where a potentiometer's gap begins, as a reading in units; that of theta is met in every turn of the
+            rod. Its reading is then of an angle within a turn, and turns are counted as 2 pi: the scale is within one.
+        dead_width: width of the gap as a reading in units, 0 for none; that of theta is less than a turn.
         stuck: probability per sample that the sensor sticks; noise and what follows go on.
         stuck_samples: how many samples it then sticks for.
         noise: standard deviation in units.
@@ -104,9 +106,7 @@ class Sensor:
         Raises:
             ValueError: an unknown field, or a value that is not allowed.
         """
-        if isinstance(sensor, Sensor):
-            return sensor
-        return cls(**mapping("sensor setting", {} if sensor is None else sensor, [f.name for f in fields(cls)]))
+        return instance(cls, "sensor setting", sensor)
 
     def __post_init__(self) -> None:
         for name in ("scale", "bias", "dead_zone"):
@@ -122,6 +122,8 @@ class Sensor:
         object.__setattr__(self, "jitter", _size("sensor jitter", self.jitter))
         if not self.dead_width[1] < sensing.TURN:
             raise ValueError(f"sensor dead_width of theta={self.dead_width[1]!r} must be less than a turn, 2 pi")
+        if self.dead_width[1] > 0.0 and not self.scale[1] > 0.0:
+            raise ValueError(f"sensor scale of theta={self.scale[1]!r} must be positive where theta has a dead_width")
         self._check_least()
 
     def _set(self, name: str, checked: Callable[[str, Any], Any]) -> None:

@@ -5,12 +5,15 @@ import math
 import numbers
 import reprlib
 from collections.abc import Iterable, Mapping
-from typing import Any
+from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .typing import Array
+
+T = TypeVar("T")
 
 MOST = 1e8
 """Most integration steps in a control period, or control periods in an episode: more is a slip, not a simulation."""
@@ -74,6 +77,17 @@ def mapping(what: str, value: Any, known: Iterable[str]) -> dict[str, Any]:
     for name in value:
         choice(what, name, known)
     return dict(value)
+
+
+def instance(cls: type[T], what: str, value: Any) -> T:
+    """A dataclass's instance from itself, a mapping of its fields or None for its defaults.
+
+    Raises:
+        ValueError: an unknown field, or a value that is not allowed.
+    """
+    if isinstance(value, cls):
+        return value
+    return cls(**mapping(what, {} if value is None else value, [f.name for f in fields(cls)]))  # type: ignore[arg-type]
 
 
 def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:

@@ -51,7 +51,8 @@ def in_numpy(actuator, wanted, substeps):
     """The same from the definitions, one after the other over the whole episode."""
     u = np.repeat(np.clip(wanted, -LIMIT, LIMIT), substeps, axis=0)
     if actuator.resolution:
-        u = actuator.resolution * np.round(u / actuator.resolution)
+        most = math.floor(LIMIT / actuator.resolution)
+        u = actuator.resolution * np.clip(np.round(u / actuator.resolution), -most, most)
     u = np.concatenate([np.zeros((actuator.delay, u.shape[1])), u])[: len(u)]
     u = np.where(np.abs(u) > actuator.dead_zone, u - np.sign(u) * actuator.dead_zone, 0.0)
     if actuator.rate_limit:
@@ -108,6 +109,15 @@ def test_a_converter_has_steps():
     found = reached(Actuator(resolution=0.25), wanted := wishes(1, 50), 1)[0]
     assert np.array_equal(4.0 * found, np.rint(4.0 * found))
     assert np.abs(found - np.clip(wanted[0], -LIMIT, LIMIT)).max() <= 0.125
+
+
+def test_no_step_of_a_converter_is_beyond_the_limit():
+    wanted = np.array([[30.0, -40.0, 27.9, 3.6]])
+    assert reached(Actuator(resolution=8.0), wanted, 1)[0].tolist() == [24.0, -24.0, 24.0, 0.0]
+    loop = loop_of(Actuator(resolution=8.0), 1, 1, math.inf)
+    loop.u[:] = 30.0
+    loop.run()
+    assert loop.rows[FORCE].item() == 32.0
 
 
 @pytest.mark.parametrize("seed", range(40))

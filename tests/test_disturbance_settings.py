@@ -51,6 +51,7 @@ compiled_alone = pytest.mark.skipif(not COMPILES, reason="is said when it is com
         ({"torque": "1"}, "disturbance torque='1' must be a finite number"),
         ({"kind": "step", "start": (-1, 0)}, "disturbance start=(-1.0, 0.0) must be at least 0"),
         ({"kind": "sine", "frequency": (0.0, 1.0)}, "disturbance frequency=(0.0, 1.0) must be greater than 0"),
+        ({"kind": "sine", "phase": (-7.0, 0.0)}, "disturbance phase=(-7.0, 0.0) must be within a turn"),
         ({"kind": "noise", "bandwidth": 0}, "disturbance bandwidth=0 must be a finite number greater than 0"),
         ({"kind": "pulses", "frequency": (1, 9), "width": 0.2}, "disturbance width=0.2 must be at most 1 / frequency"),
         ({"start": 1.0}, "disturbance start=1.0 is of no use to kind='constant': leave it out, or take kind 'step' or"),
@@ -78,3 +79,6 @@ def test_a_disturbance_acts_within_the_episode_and_between_samples():
         Disturbance("step", force=1.0, start=(0.0, 1.0)).check(0.001, 1.0)
     with pytest.raises(ValueError, match=r"width=0\.0005 s must be at least a sampling period dt=0\.001 s"):
         Disturbance("pulses", force=1.0, width=0.0005).check(0.001, 1.0)
+    Disturbance("sine", force=1.0, frequency=(1.0, 500.0)).check(0.001, 1.0)
+    with pytest.raises(ValueError, match=r"frequency=\(1\.0, 501\.0\) Hz must be at most 500 Hz, half the sampling"):
+        Disturbance("sine", force=1.0, frequency=(1.0, 501.0)).check(0.001, 1.0)

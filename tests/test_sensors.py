@@ -239,6 +239,23 @@ def test_in_a_dead_zone_the_last_reading_stays_in_every_turn_of_the_rod():
     assert (y[gap[:, 0], 0] == h[:, 0][h[:, 0] < 0.5].max()).all()
 
 
+def test_a_potentiometer_whose_scale_makes_up_for_its_gap_reads_whole_turns():
+    scale = 1.0 / 0.96
+    gap = 2.0 * math.pi * (scale - 1.0)
+    x = np.zeros((4, 2))
+    x[3] = (9.0, -9.0)
+    state, y, _ = watched(Sensor(scale=(1.0, scale), dead_zone=(0.0, 1.15), dead_width=(0.0, gap)), x, 4000)
+    theta, reading = state[:, 1], y[:, 1]
+    turns = theta / (2.0 * math.pi)
+    whole = np.abs(turns - np.rint(turns)) < 9e-4
+    assert len(runs_of(whole)) >= 10
+    error = reading - (2.0 * math.pi * np.rint(turns) + scale * (theta - 2.0 * math.pi * np.rint(turns)))
+    np.testing.assert_allclose(error[whole], 0.0, atol=1e-12)
+    steps = np.abs(np.diff(reading, axis=0))
+    assert steps.max() < 2.0 * 9.0 * DT * scale  # it goes on where it stuck, to a step
+    assert (steps[5:] == 0.0).mean() == pytest.approx(0.04, abs=0.004)
+
+
 def test_who_begins_in_a_dead_zone_reads_where_it_begins():
     x = np.array([[0.6, 0.4], [2.1 + 4.0 * math.pi, 2.1 - 4.0 * math.pi], [0.0, 0.0], [0.0, 0.0]])
     _, y, _ = watched(Sensor(dead_zone=(0.5, 2.0), dead_width=(0.2, 0.3)), x, 3)

@@ -42,5 +42,7 @@ def _show(kinds: Mapping[str, Mapping[str, Preset[Any]]], name: str | None) -> N
             console.print(f"{kind}={preset_name!r}", style="bold")
             told = said(preset.settings, whole=name is not None) or "as the default"
             console.print(Padding(told, (0, 0, 0, 4)))
+            if preset.dt is not None:
+                console.print(Padding(f"at dt={preset.dt:g} s alone, which its samples are counted of", (0, 0, 0, 4)))
             console.print(Padding(preset.source, (0, 0, 0, 4)), style="dim")
     console.file.flush()

@@ -43,7 +43,7 @@ class Hearing:
         positions = np.repeat(loop.x[None, :2], loop.substeps, axis=0)
         readings = np.zeros((loop.substeps, 6, loop.n))
         readings[:, :2] = loop.y
-        return self._told(loop, positions, readings)
+        return self._told(loop, np.zeros(loop.n), positions, readings)
 
     def drive(self, loop: Loop) -> Heard:
         """Run a control period."""
@@ -53,10 +53,10 @@ class Hearing:
             return positions, positions.copy(), loop.u, loop.u, {}
         readings = np.empty((loop.substeps, 6, loop.n))
         loop.run(positions=positions, readings=readings)
-        return self._told(loop, positions, readings)
+        return self._told(loop, loop.u, positions, readings)
 
-    def _told(self, loop: Loop, positions: Array, readings: Array) -> Heard:
-        asked, more = loop.u, {}
+    def _told(self, loop: Loop, asked: Array, positions: Array, readings: Array) -> Heard:
+        more = {}
         if self._rubs:
             more["friction"] = loop.own("plant")[FRICTION : FRICTION + 3].copy()
         if self._pushed:

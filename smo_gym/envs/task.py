@@ -15,11 +15,12 @@ from .. import presets
 from ..actuators import Actuator
 from ..disturbances import Disturbance
 from ..friction import Friction
+from ..kernels.rk4 import STABLE
 from ..plant import CartPendulum
 from ..reference import Reference, shipped
 from ..sensors import Sensor
 from ..typing import Array
-from ..validation import array, limit, mapping, multiple, number, shape_of, unknown, whole
+from ..validation import array, instance, limit, multiple, number, shape_of, short, unknown, whole
 
 _FURTHEST = 10_000  # control instants of a preview: an observation holds four numbers of each
 KEYS = 2**52
@@ -57,9 +58,7 @@ class Reward:
     @classmethod
     def of(cls, reward: Reward | Mapping[str, Any] | None) -> Reward:
         """Weights from weights, a mapping of field names or None (the defaults)."""
-        if isinstance(reward, Reward):
-            return reward
-        return cls(**mapping("reward weight", reward or {}, [f.name for f in fields(cls)]))
+        return instance(cls, "reward weight", reward)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,11 @@ class Task:
         if options.get("reference") is not None:  # it says where an episode begins and how long it is
             changes["reference"] = reference = Reference.of(options["reference"])
             changes = {"initial_state": reference.x0, "horizon": reference.horizon, **changes}
-        return replace(base, **changes)
+        task = replace(base, **changes)
+        between: tuple[Sensor | Actuator | Disturbance, ...] = (task.sensor, task.actuator, *task.disturbance)
+        for each in between:
+            each.check(task.dt, task.horizon)
+        return task
 
     def __post_init__(self) -> None:
         set_ = object.__setattr__
@@ -113,14 +116,11 @@ class Task:
             set_(self, name, number(name, getattr(self, name)))
             if not 0.0 <= getattr(self, name) < 1.0:
                 raise ValueError(f"{name}={getattr(self, name)!r} must be a fraction in [0, 1)")
-        set_(self, "sensor", presets.sensor(self.sensor))
-        set_(self, "actuator", presets.actuator(self.actuator))
-        set_(self, "disturbance", presets.disturbance(self.disturbance))
-        set_(self, "friction", presets.friction(self.friction))
-        self.sensor.check(self.dt, self.horizon)
-        self.actuator.check(self.dt, self.horizon)
-        for each in self.disturbance:
-            each.check(self.dt, self.horizon)
+        set_(self, "sensor", presets.sensor(self.sensor, self.dt))
+        set_(self, "actuator", presets.actuator(self.actuator, self.dt))
+        set_(self, "disturbance", presets.disturbance(self.disturbance, self.dt))
+        set_(self, "friction", presets.friction(self.friction, self.dt))
+        self._check_plant()
         if self.reference is not None and self.reference.params != tuple(self.params.as_array().tolist()):
             raise ValueError(
                 f"reference was computed for the plant {self.reference.params}, it must be for params={self.params}"
@@ -132,6 +132,23 @@ class Task:
             set_(self, name, limit(name, getattr(self, name)))
         low, high = self._box()
         set_(self, "initial_state", (tuple(low.tolist()), tuple(high.tolist())))
+
+    def _check_plant(self) -> None:
+        """See that Runge-Kutta steps are stable for friction and back-EMF, which brake light plants the fastest."""
+        c, _, b = (1.0 + self.friction_uncertainty) * self.rubs.as_array()
+        brakes = Friction(c + self.actuator.back_emf, 0.0, b)
+        light = replace(self.params.perturbed([-self.uncertainty] * 3), friction=brakes)
+        with np.errstate(all="ignore"):
+            rates = light.linearise()[0][2:, 2:]
+        fastest = np.abs(np.linalg.eigvals(rates)).max() if np.isfinite(rates).all() else math.inf
+        if brakes and self.dt * fastest >= STABLE:
+            rubs, emf = self.rubs, self.actuator.back_emf
+            values = {"cart_viscous": rubs.cart_viscous, "pivot_viscous": rubs.pivot_viscous, "back_emf": emf}
+            named = ", ".join(f"{name}={value!r}" for name, value in values.items() if value)
+            raise ValueError(
+                f"{named} brake the lightest plant so fast that steps of dt={self.dt!r} s are unstable: dt must be "
+                f"less than {STABLE / fastest:.4g} s, or they smaller"
+            )
 
     def _box(self) -> tuple[Array, Array]:
         shape = shape_of(self.initial_state)
@@ -195,7 +212,7 @@ class Task:
         params = self.params.draw(self.uncertainty, rng).as_array()
         low, high = self.initial_state
         state = rng.uniform(low, high)
-        return Case(params, state, float(rng.integers(KEYS)) if self.random else 0.0)
+        return Case(params, state, _key(rng) if self.random else 0.0)
 
     def asked(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """The fields of a :class:`Case` that reset options ask for.
@@ -209,14 +226,23 @@ class Task:
         if options.get("state") is not None:
             found["state"] = array("options['state']", options["state"], (4,))
         if options.get("noise") is not None:
-            found["key"] = float(whole("options['noise']", options["noise"], 0))
-            if found["key"] >= KEYS:
-                raise ValueError(f"options['noise']={options['noise']!r} must be less than 2**52")
+            noise = options["noise"]
+            if not isinstance(noise, int | np.integer) or isinstance(noise, bool) or not 0 <= noise < KEYS:
+                raise ValueError(
+                    f"options['noise']={short(noise)} must be a whole number in [0, 2**52), in a batch also one a slot"
+                )
+            found["key"] = float(noise)
         return found
 
     def as_options(self) -> dict[str, Any]:
         """The options that make this task, as plain data: what :meth:`of` takes and JSON holds."""
         return plain_data({f.name: getattr(self, f.name) for f in fields(self)})  # type: ignore[no-any-return]
+
+
+def _key(rng: np.random.Generator) -> float:
+    """A key from far ahead in a generator's sequence: plants and states to come are those of exact runs."""
+    ahead = rng.bit_generator.jumped()  # type: ignore[attr-defined]
+    return float(np.random.Generator(ahead).integers(KEYS))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,9 +10,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from ..controllers import Agent
 from ..disturbances import refused
-from ..envs.task import Task
+from ..envs.vector import PendulumVectorEnv
 from ..loop import runs_as_part
 from ..typing import Array, Flags
+from ..validation import short
 from . import metrics
 from .drivers import asked, driven, loop_inside
 from .traces import Recorder, Tracer, Traces, Watch, forces
@@ -59,14 +60,21 @@ def rollout(
         progress: called with the number of control periods done since the last call.
 
     Raises:
+        TypeError: the environment is another one, such as Gymnasium's vector environment of scalar ones.
         ValueError: the environment restarts slots by itself, ``trace_every`` is no positive integer, the agent raises
             an error, which is the cause of this one, or its force is not finite.
     """
+    base = env.unwrapped
+    if not isinstance(base, PendulumVectorEnv):
+        raise TypeError(
+            f"env={short(env)} is a {type(base).__name__}, it must be a SMOPendulum vector environment in one batch: "
+            "make it by gymnasium.make_vec(..., vectorization_mode='vector_entry_point')"
+        )
     if env.metadata.get("autoreset_mode") is not AutoresetMode.DISABLED:
         raise ValueError("a rollout is one episode a slot: make the environment with autoreset_mode='Disabled'")
     if trace_every is not None and trace_every < 1:
         raise ValueError(f"trace_every={trace_every!r} must be a positive integer")
-    task: Task = env.unwrapped.task  # type: ignore[attr-defined]
+    task = base.task
     tracer = None if trace_every is None else Tracer(trace_every, trace_slots, task)
     watch = Watch([*recorders, *([] if tracer is None else [tracer])], progress)
     n = env.num_envs
@@ -83,5 +91,5 @@ def rollout(
     for name, meter in metrics.METERS.items():
         values = meter.finish(loop.own(name), task.control_period)
         found |= {metric.name: row for metric, row in zip(meter.metrics, values, strict=True)}
-    pushed = loop if "disturbance" in loop.parts or not task.disturbance else env.unwrapped.loop  # type: ignore[attr-defined]
+    pushed = loop if "disturbance" in loop.parts or not task.disturbance else base.loop
     return Rollout(found, loop.failed > 0.0, None if tracer is None else tracer.traces(), refused(pushed))

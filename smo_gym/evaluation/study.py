@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import builtins
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from reprlib import repr as short
 from typing import Any
@@ -76,9 +76,12 @@ class Outcome:
 
     @property
     def left(self) -> Flags | None:
-        """Which runs left the operating set that an arm's gains are designed for, (runs,); None in other arms."""
+        """Which runs left the operating set that an arm's gains are designed for, (runs,); None in other arms.
+
+        None, too, where the plants are disturbed, which the set knows nothing of.
+        """
         designed = self.group.scenario.designed
-        if designed is None or not arm(self.group.arm).designed:
+        if designed is None or not arm(self.group.arm).designed or self.group.scenario.task.disturbance:
             return None
         zero = np.zeros_like(self.metrics["peak_theta"])
         x, xhat = (
@@ -91,7 +94,9 @@ class Outcome:
 
 
 def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequence[str], runs: int) -> list[Group]:
-    """All groups of some scenarios, with the nominal plant (0 %, one run) beside the scenarios' own levels.
+    """All groups of some scenarios, with the nominal plant (0 %) beside the scenarios' own levels.
+
+    That is one run, or as many as of the others where noise, friction or a disturbance differ from run to run.
 
     Raises:
         ValueError: an unknown arm; one of designed gains is wanted of a scenario that says nothing of them; or more
@@ -101,8 +106,9 @@ def groups(scenarios: Iterable[Scenario], controllers: Sequence[str], arms: Sequ
     for chosen in map(arm, arms):
         for scenario in scenarios:
             chosen.check(scenario)
+    random = {id(scenario) for scenario in scenarios if scenario.options and scenario.task.random}
     found = [
-        Group(scenario, controller, level, case, name, runs if level > 0.0 else 1)
+        Group(scenario, controller, level, case, name, runs if level > 0.0 or id(scenario) in random else 1)
         for scenario in scenarios
         for controller in controllers
         if controller in scenario.controllers
@@ -183,7 +189,7 @@ def measure(
 def run_piece(piece: Piece, progress: Callable[[float], object] = lambda seconds: None) -> Found:
     """Run a piece of work of :func:`measure`."""
     found = _run(piece.groups, piece.options, piece.seed, progress, piece.samples)
-    return piece.indices, [replace(outcome, traces=_in_rows(outcome.traces)) for outcome in found]
+    return piece.indices, [replace(each, traces=each.traces.in_rows() if each.traces else None) for each in found]
 
 
 def _pieces(wanted: Sequence[Group], done: Collection[int], seed: int, samples: int | None) -> Iterator[Piece]:
@@ -198,15 +204,6 @@ def _pieces(wanted: Sequence[Group], done: Collection[int], seed: int, samples: 
         if left := tuple(index for index in piece if index not in done):
             groups = tuple(wanted[index] for index in left)
             yield Piece(left, groups, options[id(groups[0].scenario)], seed, samples)
-
-
-def _in_rows(traces: Traces | None) -> Traces | None:
-    """Traces laid out in memory as they come from a file or another process: sums over them have the same bits."""
-    if traces is None:
-        return None
-    arrays: dict[str, Any] = {field.name: getattr(traces, field.name) for field in fields(Traces)}
-    in_rows: Any = {name: None if array is None else np.ascontiguousarray(array) for name, array in arrays.items()}
-    return Traces(**in_rows)
 
 
 def _observers(wanted: Iterable[Group]) -> list[Hashable]:
@@ -278,7 +275,7 @@ def _run(
     )
     failed, refused = np.split(result.failed, edges), np.split(result.refused, edges)
     columns = {name: np.split(values, edges) for name, values in result.metrics.items()}
-    traces = _split(result.traces, [len(part) for part in slots])
+    traces = result.traces.split([len(part) for part in slots]) if result.traces else [None] * len(batch)
     return [
         Outcome(
             group,
@@ -290,16 +287,3 @@ def _run(
         )
         for i, group in enumerate(batch)
     ]
-
-
-def _split(traces: Traces | None, sizes: Sequence[int]) -> Sequence[Traces | None]:
-    """Traces of all slots as one a group."""
-    if traces is None:
-        return [None] * len(sizes)
-    whole: dict[str, Any] = {field.name: getattr(traces, field.name) for field in fields(Traces)}
-    apart = {
-        name: np.split(values, np.cumsum(sizes)[:-1], axis=-1)
-        for name, values in whole.items()
-        if values is not None and name not in ("time", "x_d")
-    }
-    return [Traces(**{**whole, **{name: parts[i] for name, parts in apart.items()}}) for i in range(len(sizes))]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, fields, replace
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -70,6 +70,22 @@ class Traces:
     """The reference x_d in m, rad, m/s, rad/s, (m, 4); None where there is none."""
     y: Array | None = None
     """What was measured, [h, theta] in m and rad, (m, 2, n); None where the sensors are exact."""
+
+    def in_rows(self) -> Traces:
+        """The same laid out in memory as from a file or another process: sums over them have the same bits."""
+        return replace(self, **{name: np.ascontiguousarray(each) for name, each in self._by_name() if each is not None})
+
+    def split(self, sizes: Sequence[int]) -> list[Traces]:
+        """Traces of the first so many slots, of the next, and so on."""
+        apart = {
+            name: np.split(values, np.cumsum(sizes)[:-1], axis=-1)
+            for name, values in self._by_name()
+            if values is not None and name not in ("time", "x_d")
+        }
+        return [replace(self, **{name: parts[i] for name, parts in apart.items()}) for i in range(len(sizes))]
+
+    def _by_name(self) -> list[tuple[str, Any]]:
+        return [(field.name, getattr(self, field.name)) for field in fields(self)]
 
 
 LOW, HIGH, SUM, COUNT, _ = offsets(1, 1, 1, 1)

@@ -1,7 +1,11 @@
 """The equations of motion, the only place where they stand in code."""
 
+from ..typing import State
 from . import inlined
 from .elementary import sincos
+
+Forces = tuple[float, float, float, float, float, float, float, float]
+"""``(F, tau, c, b, M_c, m, l, g)`` of :func:`damped`."""
 
 
 @inlined
@@ -37,9 +41,7 @@ def drift_and_gain(
 
 
 @inlined
-def plant(
-    x: tuple[float, float, float, float], s: float, inputs: tuple[float, float, float, float, float]
-) -> tuple[float, float, float, float]:
+def plant(x: State, s: float, inputs: tuple[float, float, float, float, float]) -> State:
     """X' = f(x) + g(x) u, equations (3)-(6) and (8), for ``inputs = (u, M_c, m, l, g)``."""
     _, theta, v, omega = x
     u, M_c, m, l, g = inputs
@@ -59,11 +61,7 @@ def answer(
 
 
 @inlined
-def damped(
-    x: tuple[float, float, float, float],
-    s: float,
-    inputs: tuple[float, float, float, float, float, float, float, float],
-) -> tuple[float, float, float, float]:
+def damped(x: State, s: float, inputs: Forces) -> State:
     """X' for ``inputs = (F, tau, c, b, M_c, m, l, g)``: :func:`plant` with a torque tau and viscous friction.
 
     ``F - c h'`` acts on the cart and ``tau - b theta'`` about the pivot, each along its coordinate.
@@ -76,11 +74,7 @@ def damped(
 
 
 @inlined
-def held(
-    x: tuple[float, float, float, float],
-    s: float,
-    inputs: tuple[float, float, float, float, float, float, float, float],
-) -> tuple[float, float, float, float]:
+def held(x: State, s: float, inputs: Forces) -> State:
     """X' while the cart is held at rest, for inputs as of :func:`damped`."""
     _, theta, _, omega = x
     _, tau, _, b, _, m, l, g = inputs

@@ -9,11 +9,8 @@ import math
 
 from ..typing import State
 from . import inlined
-from .cart_pendulum import damped, held
+from .cart_pendulum import Forces, damped, held
 from .rk4 import rk4
-
-Forces = tuple[float, float, float, float, float, float, float, float]
-"""``(F, tau, c, b, M_c, m, l, g)`` of :func:`~smo_gym.kernels.cart_pendulum.damped`: all but Coulomb friction."""
 
 
 @inlined

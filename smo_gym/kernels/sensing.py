@@ -74,14 +74,16 @@ def _take(signals: Array, own: Array, lanes: int) -> None:
 
 @inlined
 def _skip_dead_zone(signals: Array, own: Array, lanes: int, c: int) -> None:
-    start, width, turn = own[(DEAD_ZONE + c) * LANES], own[(DEAD_WIDTH + c) * LANES], TURN * c
+    start, width = own[(DEAD_ZONE + c) * LANES], own[(DEAD_WIDTH + c) * LANES]
+    turn = own[(SCALE + c) * LANES] * TURN  # of the rod, as the scale would have it
     for i in range(lanes):
         y = at(signals, Y + c, i)
-        beyond = y - start
-        beyond -= turn * rounded(beyond / TURN - 0.5)
+        turns = c * rounded((y - start) / turn - 0.5)
+        beyond = y - start - turn * turns
         outside, count = at(own, OUTSIDE + c, i), at(own, COUNT, i)
-        last = outside if count > 0.0 else y - beyond
-        y = last if (beyond >= 0.0) & (beyond < width) else y
+        last = outside if count > 0.0 else start + TURN * turns
+        counted = y - c * (turn - TURN) * (turns + 1.0)
+        y = last if (beyond >= 0.0) & (beyond < width) else counted
         put(own, OUTSIDE + c, i, y)
         put(signals, Y + c, i, y)
 

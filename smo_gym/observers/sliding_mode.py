@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..kernels.blocks import Block
+from ..kernels.rk4 import STABLE
 from ..kernels.sliding import PERIOD, Schedule, explicit, implicit
 from ..loop import Part, columns
 from ..models import Model
@@ -24,8 +25,6 @@ from .gains import Gains
 
 # tanh(k e) with a slope this steep is sgn(e) for every e that is not 0, and 0 for e = 0.
 _EXACT = 1e300
-# RK4 is stable for x' = -r x up to r dt = 2.785 (the real root of 1 + z/2 + z^2/6 + z^3/24).
-_RK4_LIMIT = 2.785
 
 INJECTIONS = ("34", "26")
 SCHEMES = ("rk4", "implicit")
@@ -131,7 +130,7 @@ class SlidingModeObserver(Compiling):
         m2 = np.array(gains.beta_1) + self.compensation * np.array(gains.beta_2) * force
         rates = [m * k for m, k in zip((m1, m2), self._k, strict=True)]
         fastest = max((float(r) for rate in rates for r in rate if math.isfinite(r)), default=0.0)
-        return _RK4_LIMIT / fastest if fastest > 0.0 else math.inf
+        return STABLE / fastest if fastest > 0.0 else math.inf
 
     def as_dict(self) -> dict[str, Any]:
         """The settings by name, of plain types, as the constructor takes them."""

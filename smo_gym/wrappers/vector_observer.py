@@ -10,9 +10,12 @@ from gymnasium.utils import RecordConstructorArgs
 from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 
 from ..envs.vector import PendulumVectorEnv, only
+from ..loop import Slots
 from ..observers import Observer
 from ..typing import Array, Flags
 from .inside import Plugged, at_work, bring, lost_of, make_observer, named, space_of, task_of, unseen
+
+_EVERY = slice(None)
 
 
 class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], RecordConstructorArgs):
@@ -75,11 +78,11 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Start the episodes and their estimates."""
+        started = (options or {}).get("reset_mask", self._every)  # before Gymnasium's own environments take it out
         observation, info = self.env.reset(seed=seed, options=options)  # type: ignore[arg-type]
-        started = (options or {}).get("reset_mask", self._every)
         self._restart(started, observation, info)
         self._over[started] = False
-        return self._append(observation, info, self._estimator.xhat, self._none), info
+        return self._append(observation, info, self._estimator.xhat, self._none, started), info
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Run a control period and bring the estimates to its end."""
@@ -112,16 +115,17 @@ class VectorObserverWrapper(VectorWrapper[Array, Array, Array, Array, Array], Re
             self._restart(restarted, observation, info)
             failed, xhat = only(failed, ~restarted), self._estimator.xhat
         self._over, self._any_over = ended, any_ended
-        return self._append(observation, info, xhat, failed), reward, terminated, truncated, info
+        return self._append(observation, info, xhat, failed, _EVERY), reward, terminated, truncated, info
 
     def _restart(self, slots: Flags, observation: Array, info: dict[str, Any]) -> None:
         self._estimator.reset(slots, observation[:, :2].T)
         if self._see is not None:
             self._see(slots, info["state"].T)
 
-    def _append(self, observation: Array, info: dict[str, Any], xhat: Array, failed: Flags) -> Array:
-        if np.count_nonzero(observation[:, :2] != info["samples"][:, -1]):
-            raise unseen(observation[:, :2], info["samples"][:, -1])
+    def _append(self, observation: Array, info: dict[str, Any], xhat: Array, failed: Flags, told: Slots) -> Array:
+        seen, measured = observation[told, :2], info["samples"][told, -1]
+        if np.count_nonzero(seen != measured):
+            raise unseen(seen, measured)
         info["estimate_failed"], info["_estimate_failed"] = failed, self._every
         self._show(xhat)
         appended = np.empty((len(observation), observation.shape[1] + 4))

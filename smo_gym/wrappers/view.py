@@ -150,8 +150,8 @@ class VectorAgentView(VectorWrapper[Single, Array, Array, Array, Array]):
 
     def reset(self, *, seed: Any = None, options: dict[str, Any] | None = None) -> tuple[Single, dict[str, Any]]:
         """Start the episodes."""
-        observation, info = self.env.reset(seed=seed, options=options)
         started = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
+        observation, info = self.env.reset(seed=seed, options=options)
         self._frames[started] = scaled(observation, self._units)[started, None]
         self._over[started] = False
         return self._told(), info

@@ -44,3 +44,12 @@ def test_where_an_episode_may_be_cut(make_vec):
     for steps in (0, 6, np.array([1, 2, 6]), np.array([1, 2]), 2.0, True, "3", [[1, 1, 1]], None):
         with pytest.raises(ValueError, match=r"options\['steps'\]=.* must be "):
             env.reset(options={"steps": steps})
+
+
+@pytest.mark.parametrize("options", [{}, {"actuator": "lag"}])
+def test_a_partial_reset_tells_of_no_force_in_any_slot(make_vec, options):
+    env = make_vec(2, **options)
+    env.reset(seed=0)
+    env.step(np.ones((2, 1)))
+    *_, info = env.reset(options={"reset_mask": np.array([True, False])})
+    assert info["asked"].tolist() == info["force"].tolist() == [0.0, 0.0]

@@ -125,3 +125,10 @@ def test_a_rollout_wants_one_episode_a_slot(make_vec):
         rollout(make_vec(1), LQR(K))
     with pytest.raises(ValueError, match="trace_every=0"):
         rollout(make_vec(1, autoreset_mode="Disabled"), LQR(K), trace_every=0)
+
+
+def test_gymnasiums_own_batch_is_refused_by_name():
+    env = gymnasium.make_vec("SMOPendulum-v0", 2, vectorization_mode="sync")
+    for each in (env, VectorObserverWrapper(env)):
+        with pytest.raises(TypeError, match=r"is a SyncVectorEnv, .* make it by gymnasium\.make_vec\(\.\.\., vectoriz"):
+            rollout(each, LQR(K))

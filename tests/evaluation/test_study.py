@@ -7,8 +7,9 @@ from conftest import SMALL
 
 import smo_gym
 from smo_gym import LQR, CartPendulum
-from smo_gym.evaluation import scenario, study
+from smo_gym.evaluation import configs, scenario, study
 from smo_gym.evaluation.draws import deviations
+from smo_gym.plant import STATE_NAMES
 
 K = [7.234, -4.132, 11.075, -1.025]
 
@@ -35,6 +36,31 @@ def test_a_study_is_what_single_runs_give(small):
             observation, _, _, truncated, info = env.step(LQR(K).predict(observation)[0])
             squares += [*info["samples"][:, 1] ** 2]
         assert outcome.metrics["mse_theta"][2] == pytest.approx(np.mean(squares), rel=1e-12)
+
+
+def test_the_nominal_plant_runs_as_often_as_the_others_where_it_is_random(small):
+    def runs(**options):
+        return [group.runs for group in study.groups([small.with_options(**options)], ["lqr"], ["with"], 3)]
+
+    assert runs(sensor="encoders") == runs(friction_uncertainty=0.1) == [1, 3, 3]
+    assert runs(disturbance={"kind": "noise", "force": 1.0}) == [3, 3, 3]
+    noisy = small.with_options(sensor={"noise": (0.0, 1e-2)})
+    nominal, *_ = study.measure(study.groups([noisy], ["lqr"], ["with"], 3), seed=0)
+    assert len({*nominal.metrics["mse_theta"]}) == 3
+    assert np.ptp(nominal.plants, axis=0).max() == 0.0
+
+
+def test_a_push_is_not_counted_as_leaving_the_set_of_designed_gains():
+    place = scenario.load(configs.path("initial-conditions"))
+    peaks = {f"{peak}_{name}": np.zeros(1) for peak in ("peak", "peak_estimate") for name in STATE_NAMES[1:]}
+    metrics = {**peaks, "peak_force": np.zeros(1)}
+
+    def left(given):
+        group, *_ = study.groups([given], ["lqr"], ["theorem"], 1)
+        return study.Outcome(group, metrics, np.zeros(1, dtype=np.bool_)).left
+
+    assert left(place).tolist() == [False]
+    assert left(place.with_options(disturbance="push")) is None
 
 
 def test_more_runs_add_to_those_that_were_there():

@@ -57,11 +57,14 @@ def definition(sensor, key, states):
         now = []
         for c in range(2):
             y = sensor.scale[c] * (x[c] + tau * x[2 + c]) + sensor.bias[c]
-            beyond = y - sensor.dead_zone[c]
-            if c == 1:
-                beyond -= 2 * math.pi * math.floor(beyond / (2 * math.pi))
-            if 0 <= beyond < sensor.dead_width[c]:
-                y = y - beyond if k == 0 else outside[c]
+            if sensor.dead_width[c]:
+                turn = sensor.scale[c] * 2 * math.pi
+                zones = math.floor((y - sensor.dead_zone[c]) / turn) if c == 1 else 0
+                beyond = y - sensor.dead_zone[c] - turn * zones
+                if 0 <= beyond < sensor.dead_width[c]:
+                    y = sensor.dead_zone[c] + 2 * math.pi * zones if k == 0 else outside[c]
+                elif c == 1:
+                    y = y - (turn - 2 * math.pi) * (zones + 1.0)
             outside[c] = y
             if stuck_left[c] == 0 and k > 0 and draw(4 + c) < sensor.stuck[c]:
                 stuck_left[c] = sensor.stuck_samples[c]

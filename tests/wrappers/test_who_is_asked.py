@@ -1,5 +1,7 @@
 """Whoever changes what is measured, estimated or done is heard, also where a compiled part would be at hand."""
 
+from functools import partial
+
 import gymnasium
 import numpy as np
 import pytest
@@ -124,6 +126,21 @@ def test_the_oracle_sees_the_truth_in_every_kind_of_batch(make_vec, some, mode):
     for _ in range(25):
         told = [batch.step(np.full((3, 1), 5.0))[0] for batch in batches]
         assert (told[0] == told[1]).all()
+
+
+@pytest.mark.parametrize("wrapper", [VectorObserverWrapper, partial(VectorAgentView, observation="stacked")])
+def test_part_of_gymnasiums_own_batch_starts_anew_as_part_of_ours(make_vec, wrapper):
+    mode = gymnasium.vector.AutoresetMode.DISABLED
+    single = partial(gymnasium.make, "SMOPendulum-v0")
+    ours = make_vec(3, autoreset_mode=mode)
+    batches = [wrapper(env) for env in (ours, gymnasium.vector.SyncVectorEnv([single] * 3, autoreset_mode=mode))]
+    for batch in batches:
+        batch.reset(seed=0)
+        batch.step(np.full((3, 1), 0.5))
+    told = [batch.reset(options={"reset_mask": np.array([True, False, False])})[0] for batch in batches]
+    for _ in range(3):
+        assert (told[0] == told[1]).all()
+        told = [batch.step(np.full((3, 1), 0.5))[0] for batch in batches]
 
 
 def test_an_agent_that_is_to_see_the_state_sees_it_in_subprocesses_and_loops():
