@@ -98,7 +98,7 @@ class SlidingModeObserver(Compiling):
         object.__setattr__(self, "gains", Gains.of(self.gains))
         if self.model is not None and not isinstance(self.model, Model):
             object.__setattr__(self, "model", CartPendulum.of(self.model, name="model"))
-        if self.xhat0 != MEASURED:
+        if not (isinstance(self.xhat0, str) and self.xhat0 == MEASURED):
             object.__setattr__(self, "xhat0", tuple(array("xhat0", self.xhat0, (4,)).tolist()))
         object.__setattr__(self, "compensation", switch("compensation", self.compensation))
         object.__setattr__(self, "slopes", _slopes(self.slopes))
