@@ -18,12 +18,13 @@ import numpy as np
 import yaml
 
 from .. import files
-from ..evaluation import candidates, formats, logged
-from ..evaluation.logged import Log
+from ..evaluation import candidates, formats
 from ..evaluation.report import figures, log_panels
 from ..models import Model
 from ..plant import CartPendulum
 from ..policies import named
+from ..recordings import logged
+from ..recordings.logged import Log
 from ..typing import Array
 from ..validation import unknown
 from .arguments import Parser

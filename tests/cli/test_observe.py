@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from smo_gym.evaluation import logged
+from smo_gym.recordings import logged
 
 
 def log(path, turn=1.0, header="time,position,angle,u", gap=False, wrap=False):

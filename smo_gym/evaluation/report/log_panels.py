@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...recordings.logged import Log
 from ...typing import Array
-from ..logged import Log
 from .figures import STYLE
 
 if TYPE_CHECKING:

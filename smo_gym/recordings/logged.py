@@ -65,7 +65,7 @@ def read(path: Path, positions: Sequence[str], given: str, time: str | None = No
         y[:, 1] *= math.pi / 180.0
     y[:, 1] = np.unwrap(y[:, 1], period=2.0 * math.pi)
     if degrees is None and (why := _looks_like_degrees(t, values[:, 2])):
-        raise ValueError(f"{path}: {positions[1]} {why}: is it in degrees? say --degrees or --radians")
+        raise ValueError(f"{path}: {positions[1]} {why}: is it in degrees? (observe takes --degrees and --radians)")
     return Log(t, y, u)
 
 

@@ -1,0 +1,55 @@
+"""What a real rig is known by, and what was recorded of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..models import Model
+from ..typing import Array, Flags
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """One run."""
+
+    name: str
+    t: Array
+    """Times of the samples in s, (samples,); gaps stay."""
+    y: Array
+    """Positions, (samples, 2), the second an angle without jumps of a turn."""
+    u: Array
+    """Input from each sample to the next, in the model's unit, (samples,)."""
+    fault: Flags
+    """Samples at which the sensor of the second position says nothing, (samples,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """A rig: its model, its sensors, and how its recordings are read and scored."""
+
+    name: str
+    channels: tuple[str, str]
+    """Names of both velocities in tables."""
+    units: tuple[str, str]
+    model: Model
+    period: float
+    """Sampling period in s."""
+    noise: tuple[float, float]
+    """Standard deviations of the positions."""
+    acceleration: tuple[float, float]
+    """Process noise: accelerations per root Hz, the first along the input."""
+    columns: tuple[str, str, str, str]
+    """Columns of time, both positions and the input."""
+    corrected: Callable[[Array], tuple[Array, Flags]]
+    """The second position, and where it says nothing, from its unwrapped readings."""
+    delay: float
+    """Of the input, in samples."""
+    unscored: tuple[int, int]
+    """Samples at both ends of a run that are not scored: an estimator's start, a smoother's end."""
+    lost: float
+    """RMS error of the second velocity beyond which a run is lost."""
+    window: tuple[int, int]
+    """Samples and degree of the Savitzky-Golay reference."""
+    jerk: tuple[float, float]
+    """Jerks per root Hz that the model-free smoother grants."""
