@@ -1,11 +1,39 @@
 """Observers: one a file, all behind the :class:`~smo_gym.observers.protocol.Observer` protocol."""
 
+from .difference import BackwardDifference, FilteredDerivative
 from .estimator import start_each
 from .gains import Gains
+from .high_gain import HighGain
+from .homogeneous import Homogeneous
 from .oracle import Oracle
 from .protocol import Compiled, Estimator, Observer
 from .sliding_mode import SlidingModeObserver
+from .super_twisting import Levant, SuperTwisting
 
-OBSERVERS = {"smo": SlidingModeObserver, "oracle": Oracle}
+OBSERVERS = {
+    "smo": SlidingModeObserver,
+    "backward-difference": BackwardDifference,
+    "filtered-derivative": FilteredDerivative,
+    "high-gain": HighGain,
+    "levant": Levant,
+    "super-twisting": SuperTwisting,
+    "homogeneous": Homogeneous,
+    "oracle": Oracle,
+}
 
-__all__ = ["OBSERVERS", "Compiled", "Estimator", "Gains", "Observer", "Oracle", "SlidingModeObserver", "start_each"]
+__all__ = [
+    "OBSERVERS",
+    "BackwardDifference",
+    "Compiled",
+    "Estimator",
+    "FilteredDerivative",
+    "Gains",
+    "HighGain",
+    "Homogeneous",
+    "Levant",
+    "Observer",
+    "Oracle",
+    "SlidingModeObserver",
+    "SuperTwisting",
+    "start_each",
+]
