@@ -47,8 +47,14 @@ class Model:
 
     @classmethod
     def of(cls, plant_: Model | CartPendulum) -> Model:
-        """A model, or that of a cart pendulum, of whose friction it knows nothing."""
-        return plant_ if isinstance(plant_, Model) else cls(plant, tuple(plant_.as_array().tolist()))
+        """A model, or that of a cart pendulum, of whose friction it knows nothing.
+
+        Raises:
+            ValueError: it is neither.
+        """
+        if isinstance(plant_, Model):
+            return plant_
+        return cls(plant, tuple(CartPendulum.of(plant_, name="model").as_array().tolist()))
 
     def rate(self, x: ArrayLike, u: float) -> Array:
         """X' at one state, (4,)."""

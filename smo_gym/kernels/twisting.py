@@ -3,13 +3,12 @@
 import math
 
 from . import inlined
+from .elementary import cube_root_above
 
 # Levant, Robust exact differentiation via sliding mode technique, Automatica 34 (1998).
 K_1, K_2 = 1.5, 1.1
 # Levant, Higher-order sliding modes, Int. J. Control 76 (2003), in the form that is not nested.
 C_1, C_2, C_3 = 2.0, 2.12, 1.1
-_HALLEY = 4
-"""Steps of Halley's method on a cubic that is convex and grows, from a point above its root."""
 
 
 @inlined
@@ -66,6 +65,24 @@ def implicit(q_new: float, y: float, h: float, L: float) -> tuple[float, float, 
 
 
 @inlined
+def _halley(s: float, a: float, b: float, c: float) -> float:
+    """A step of Halley's method on s^3 + a s^2 + b s = c."""
+    value, slope = ((s + a) * s + b) * s - c, (3.0 * s + 2.0 * a) * s + b
+    return s - value * slope / (slope * slope - value * (3.0 * s + a))
+
+
+@inlined
+def positive_root(a: float, b: float, c: float) -> float:
+    """The s >= 0 where s^3 + a s^2 + b s = c, for numbers that are not negative and b > 0.
+
+    Each term alone bounds it from above, the least of these bounds is at most three times the root, and from there three
+    steps leave nothing but rounding.
+    """
+    s = min(c / b, math.sqrt(c / a), cube_root_above(c))
+    return _halley(_halley(_halley(s, a, b, c), a, b, c), a, b, c)
+
+
+@inlined
 def homogeneous(
     q_new: float, a: float, y: float, h: float, c_1: float, c_2: float, c_3: float
 ) -> tuple[float, float, float]:
@@ -81,10 +98,6 @@ def homogeneous(
     least = h * h * h * c_3
     a += h * c_3 * clipped(b / least)
     rest = max(abs(b) - least, 0.0)
-    s = min(rest / (h * h * c_2), math.sqrt(rest / (h * c_1)))
-    for _ in range(_HALLEY):
-        value = ((s + h * c_1) * s + h * h * c_2) * s - rest
-        slope = (3.0 * s + 2.0 * h * c_1) * s + h * h * c_2
-        s -= value * slope / (slope * slope - value * (3.0 * s + h * c_1))
+    s = positive_root(h * c_1, h * h * c_2, rest)
     more = h * (c_2 * s * sign(b) + a)
     return h * (c_1 * s * s * sign(b)) + h * more, more, a

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
+from ..kernels import inlined
 from ..kernels.blocks import XHAT, Block, U, Y, at, four, offsets, put_four, two
+from ..kernels.elementary import tanh
 from ..kernels.modelling import Params, Rhs, for_each_model
 from ..kernels.rk4 import rk4
 from ..loop import Part, columns
@@ -20,6 +20,14 @@ from .positions import positive
 PERIOD, POLES, MODEL = offsets(1, 2)
 
 
+@inlined
+def _gains(decay: float) -> tuple[float, float]:
+    """(1 - b^2, (1 - b)^2) for b = exp(-decay), without the cancellation: 1 - b = 2 t / (1 + t), t = tanh(decay / 2)."""
+    t = tanh(0.5 * decay)
+    share = 1.0 / (1.0 + t)
+    return 4.0 * t * share * share, 4.0 * t * t * share * share
+
+
 @for_each_model
 def _estimate(rhs: Rhs, params: Params, use_model: bool) -> Block:
     def estimate(signals: Array, own: Array, lanes: int) -> None:
@@ -30,11 +38,10 @@ def _estimate(rhs: Rhs, params: Params, use_model: bool) -> Block:
                 q, theta, v, omega = rk4(rhs, xhat, (u,) + params(own, MODEL, i), h)  # noqa: RUF005
             else:
                 q, theta, v, omega = xhat[0] + h * xhat[2], xhat[1] + h * xhat[3], xhat[2], xhat[3]
-            b = np.exp(-pole[0] * h), np.exp(-pole[1] * h)
+            near, far = _gains(pole[0] * h), _gains(pole[1] * h)
             e = y[0] - q, y[1] - theta
-            q, theta = q + (1.0 - b[0] * b[0]) * e[0], theta + (1.0 - b[1] * b[1]) * e[1]
-            v += (1.0 - b[0]) * (1.0 - b[0]) / h * e[0]
-            omega += (1.0 - b[1]) * (1.0 - b[1]) / h * e[1]
+            q, theta = q + near[0] * e[0], theta + far[0] * e[1]
+            v, omega = v + near[1] / h * e[0], omega + far[1] / h * e[1]
             put_four(signals, XHAT, i, (q, theta, v, omega))
 
     return estimate
