@@ -22,7 +22,7 @@ from ..evaluation.observing import Row
 from ..evaluation.report import figures, observer_panels
 from ..evaluation.store import FOLDER, Store
 from ..evaluation.study import simulated_seconds
-from . import computing
+from . import computing, real
 from .arguments import Parser, one_of, several
 from .entry import command
 
@@ -46,10 +46,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.runs(200, "random plants at each level of uncertainty")
     parser.seed("the random plants and noise")
     parser.add_argument("--figure", action="store_true", help="draw it, as PDF and PNG into DIR")
+    parser.add_argument("--mismatch", action="store_true", help="with --data: wrong models, all observers tuned again")
     parser.out("observers")
     computing.add(parser)
     args = parser.parse_args(arguments)
-    return _simulated(args)
+    return _simulated(args) if args.data is None else real.measure(args)
 
 
 def chosen(known: candidates.Candidates, names: Sequence[str] | None) -> dict[str, candidates.Candidate]:

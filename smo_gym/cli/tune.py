@@ -9,6 +9,7 @@ Writes the settings with the numbers that it found, to be compared with those th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +20,16 @@ from tqdm import tqdm
 from .. import files
 from ..evaluation import candidates, objectives
 from ..evaluation.candidates import Candidate, Candidates
+from ..evaluation.on_recordings import Runs
 from ..evaluation.store import digest, kept
 from ..evaluation.tuning import Tuned, tune
+from ..recordings import RIGS, load
 from .arguments import Parser, one_of, several, whole
 from .entry import Stop, command
 from .observers import chosen
 
 SIMULATED = "simulated"
-WHERE = (SIMULATED,)
+WHERE = (SIMULATED, *RIGS)
 
 
 @command("tune")
@@ -40,6 +43,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=whole(0), metavar="N", help="of the search (default: the settings')")
     parser.out("tuned")
     args = parser.parse_args(arguments)
+    if (args.where == SIMULATED) != (args.data is None):
+        raise ValueError(f"--data {args.data}: the folder of recordings is of a rig, {SIMULATED} has none")
     settings = candidates.named(args.where)
     given = {name: value for name in ("budget", "seed") if (value := getattr(args, name)) is not None}
     settings = settings.model_copy(update=given)
@@ -47,13 +52,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not observers:
         raise ValueError(f"--observer {' '.join(args.observer)}: nothing of it is tuned")
     name = f"observers-{args.where}.yaml"
+    if args.where == SIMULATED:
+        objective: Any = objectives.simulated
+    else:
+        runs = Runs.of(RIGS[args.where], load(RIGS[args.where], args.data, "train"))
+        objective = partial(objectives.on_runs, runs=runs)
     found: dict[str, Tuned] = {}
     with files.claimed(args.out, (name,)) as out, kept(out) as store:
         total = settings.budget * len(observers)
         try:
             with tqdm(total=total, unit="evaluation", desc="tuning", leave=False, disable=None) as bar:
                 for each, candidate in observers.items():
-                    found[each] = _one(candidate, settings, store, bar.update)
+                    found[each] = _one(candidate, settings, objective, store, bar.update)
         except KeyboardInterrupt:
             raise Stop(f"interrupted; the same command goes on from what is in {out}") from None
         files.write_set(out, {name: _written(settings, observers, found)})
@@ -64,16 +74,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _one(candidate: Candidate, settings: Candidates, store: Any, told: Any) -> Tuned:
+def _one(candidate: Candidate, settings: Candidates, objective: Any, store: Any, told: Any) -> Tuned:
     assert candidate.tuned is not None
     begin = candidate.tuned.value
     told_of = candidate.model_dump(mode="json")
-    key = digest(["tuning", told_of, settings.budget, settings.seed, settings.scales])
+    key = digest(["tuning", told_of, settings.title, settings.budget, settings.seed, settings.scales])
     if (done := store.read(key)) is not None:
         told(settings.budget)
         value = candidates.with_leaves(begin, iter(done["value"].tolist()))
         return Tuned(value, float(done["cost"]), float(done["start"]), int(done["evaluations"]))
-    cost = objectives.simulated(candidate, settings.scales)
+    cost = objective(candidate, scales=settings.scales)
     tuned = tune(cost, begin, settings.budget, settings.seed, told)
     numbers = np.array([number for _, number in candidates.leaves(tuned.value)])
     store.write(key, {"value": numbers, "cost": tuned.cost, "start": tuned.start, "evaluations": tuned.evaluations})

@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ..recordings import scoring, smoothing
 from ..typing import Array
 from . import observing, velocity_errors
 from .candidates import Candidate, Tree
+from .on_recordings import Runs
 from .open_loop import Trajectories
 
 SENSORS = ("counts", "noise")
@@ -31,6 +33,20 @@ def simulated(candidate: Candidate, scales: tuple[float, float]) -> Objective:
                 found = velocity_errors.errors(seen.estimated(observer), seen.x, seen.dt)
                 total += weighed(np.sqrt((found.rmse**2).mean(1)), scales)
         return total
+
+    return cost
+
+
+def on_runs(candidate: Candidate, runs: Runs, scales: tuple[float, float]) -> Objective:
+    """Of a candidate on a rig's recordings, against the smoother with the model."""
+    reference = runs.references[smoothing.MODEL]
+    masks = [scoring.scored(runs.rig, each) for each in runs.recordings]
+
+    def cost(tuned: Tree) -> float:
+        found = runs.velocities(candidate.build(runs.rig.model, tuned))
+        with np.errstate(over="ignore", invalid="ignore"):
+            e = np.concatenate([(v - w)[mask] for v, w, mask in zip(found, reference, masks, strict=True)])
+            return weighed(np.sqrt((e**2).mean(0)), scales)
 
     return cost
 

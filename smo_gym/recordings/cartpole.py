@@ -63,4 +63,5 @@ CART_POLE = Rig(
     lost=0.5,
     window=(7, 4),
     jerk=(1500.0, 150.0),
+    parts={"gain": (4,), "inverse_length": (0, 1)},
 )

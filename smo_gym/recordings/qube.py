@@ -61,4 +61,5 @@ QUBE = Rig(
     lost=1.0,
     window=(31, 4),
     jerk=(3e3, 3e3),
+    parts={"gain": (5,), "inverse_length": (0, 1)},
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 from ..models import Model
 from ..typing import Array, Flags
@@ -53,3 +53,13 @@ class Rig:
     """Samples and degree of the Savitzky-Golay reference."""
     jerk: tuple[float, float]
     """Jerks per root Hz that the model-free smoother grants."""
+    parts: Mapping[str, tuple[int, ...]]
+    """Which of the model's numbers grow with the motor's gain and with the inverse of the pendulum's length."""
+
+    def mistaken(self, **factors: float) -> Model:
+        """The model with a motor gain, or an inverse length, that is wrong by some factors."""
+        numbers = list(self.model.params)
+        for part, factor in factors.items():
+            for index in self.parts[part]:
+                numbers[index] *= factor
+        return replace(self.model, params=tuple(numbers))

@@ -28,6 +28,7 @@ SHARED = {
     "narrow",
     "processes",
     "progress",
+    "real",
     "recording",
     "starting",
 }

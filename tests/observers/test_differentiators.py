@@ -99,7 +99,7 @@ def test_an_implicit_step_reaches_zero_in_finite_time_and_stays(scheme):
     e = np.abs(xhat[:, 2] + 0.7)
     first = len(e) - int(np.argmax(e[::-1] > 1e-11))  # zero from here on
     assert 5 < first < 150
-    assert np.abs(np.diff(xhat[first:, 2])).sum() < 1e-9  # no chatter but of rounding
+    assert np.abs(np.diff(xhat[first:, 2])).sum() < 1e-9  # no chatter
     assert np.abs(np.diff(run(Levant((4.0, 4.0), "explicit"), line)[first:, 2])).sum() > 1.0
 
 
@@ -185,7 +185,7 @@ def test_a_gap_does_no_harm(observer):
     keep = np.delete(np.arange(1500), [700, 701, 900, 1100, 1101, 1102])
     y = np.column_stack([0.3 * T, -0.2 * T])[keep]
     xhat = observer.run(T[keep], y, np.zeros(len(keep)), model=FALLING)
-    chatter = 1.0 if getattr(observer, "scheme", "") == "explicit" else 1e-3
+    chatter = 0.05 * max(observer.L) if getattr(observer, "scheme", "") == "explicit" else 1e-3
     assert np.abs(xhat[800:, 2:] - [0.3, -0.2]).max() < chatter
 
 
