@@ -143,4 +143,4 @@ def cube_root_above(x: float) -> float:
     third = (third >> 2) + (third >> 4)  # 1/3 = (1/4 + 1/16) (1 + 1/16) (1 + 1/256) ...
     third += third >> 4
     third += third >> 8
-    return _from_bits(third + _TWO_THIRDS_OF_ONE)  # type: ignore[no-any-return]
+    return _from_bits(third + _TWO_THIRDS_OF_ONE)

@@ -75,8 +75,8 @@ def _halley(s: float, a: float, b: float, c: float) -> float:
 def positive_root(a: float, b: float, c: float) -> float:
     """The s >= 0 where s^3 + a s^2 + b s = c, for numbers that are not negative and b > 0.
 
-    Each term alone bounds it from above, the least of these bounds is at most three times the root, and from there three
-    steps leave nothing but rounding.
+    Each term alone bounds it from above; the least of these bounds is at most three times the root, and from there
+    three steps leave nothing but rounding.
     """
     s = min(c / b, math.sqrt(c / a), cube_root_above(c))
     return _halley(_halley(_halley(s, a, b, c), a, b, c), a, b, c)

@@ -60,16 +60,17 @@ class SuperTwisting(Compiling):
     50, 2005): without noise the estimate is exact after a finite time where L bounds the drift that the model lacks.
 
     Schemes: ``"explicit"`` is Euler's step with the error at the sample before, and chatters; ``"implicit"`` solves for
-    the error at its end (Acary and Brogliato 2010) and does not, but tells the velocity of the middle of the period, h / 2
-    times that drift off; ``"proper"`` adds h / 2 times the acceleration that the step has found, so that a drift that
-    stays leaves no error.
+    the error at its end (Acary and Brogliato 2010) and does not, but tells the velocity of the middle of the period,
+    h / 2 times that drift off; ``"proper"`` adds h / 2 times the acceleration that the step has found, so that a drift
+    that stays leaves no error.
 
     Once the error is 0 and without a model, "implicit" is the backward difference and "proper" the three-point formula
     (3 y_k - 4 y_{k-1} + y_{k-2}) / (2 h). That is the output which Seeber makes of the three states of the second-order
-    differentiator (Proper implicit discretization of arbitrary-order robust exact differentiators, arXiv 2404.02770; here
-    :class:`~smo_gym.observers.homogeneous.Homogeneous`). His first-order one has no third state and tells the backward
-    difference; that what the step has found may stand in for it is ours. It costs: a drift that jumps within L makes an
-    error of up to 2/3 h L instead of 1/2 h L, and noise of at most eps one of 4 eps / h instead of 2 eps / h.
+    differentiator (Proper implicit discretization of arbitrary-order robust exact differentiators, arXiv 2404.02770;
+    here :class:`~smo_gym.observers.homogeneous.Homogeneous`). His first-order one has no third state and tells the
+    backward difference; that what the step has found may stand in for it is ours. It costs: an acceleration that jumps
+    within L makes an error of up to 2/3 h L instead of 1/2 h L, noise of at most eps one of 4 eps / h instead of
+    2 eps / h.
 
     Args:
         L: bound of the acceleration that the model lacks, m/s^2 and rad/s^2.

@@ -114,8 +114,7 @@ def test_levants_error_grows_as_the_square_root_of_the_noise(scheme):
         noises = [eps * np.sin(t * np.sqrt(share / eps)) for share in (0.2, 0.5, 0.8, 2.0, 5.0)]
         noises.append(np.random.default_rng(0).uniform(-eps, eps, len(t)))
         worst = [
-            np.abs(Levant((1.0, 1.0), scheme).run(t, y, 0.0 * t)[20_000:, 2] - 0.5).max()
-            for y in map(_pair, noises)
+            np.abs(Levant((1.0, 1.0), scheme).run(t, y, 0.0 * t)[20_000:, 2] - 0.5).max() for y in map(_pair, noises)
         ]
         errors.append(max(worst))
     slope = np.polyfit(np.log(bounds), np.log(errors), 1)[0]
