@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..kernels.blocks import XHAT, Block, U, Y, at, four, offsets, put_four, two
+from ..kernels.elementary import exp
 from ..kernels.modelling import Params, Rhs, for_each_model
 from ..kernels.rk4 import rk4
 from ..loop import Part, columns
 from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array
-from ..validation import switch
+from ..validation import positive_pair, switch
 from .estimator import Compiling
-from .positions import positive
 
 PERIOD, POLES, MODEL = offsets(1, 2)
 
@@ -30,7 +28,7 @@ def _estimate(rhs: Rhs, params: Params, use_model: bool) -> Block:
                 q, theta, v, omega = rk4(rhs, xhat, (u,) + params(own, MODEL, i), h)  # noqa: RUF005
             else:
                 q, theta, v, omega = xhat[0] + h * xhat[2], xhat[1] + h * xhat[3], xhat[2], xhat[3]
-            b = np.exp(-pole[0] * h), np.exp(-pole[1] * h)
+            b = exp(-pole[0] * h), exp(-pole[1] * h)
             e = y[0] - q, y[1] - theta
             q, theta = q + (1.0 - b[0] * b[0]) * e[0], theta + (1.0 - b[1] * b[1]) * e[1]
             v += (1.0 - b[0]) * (1.0 - b[0]) / h * e[0]
@@ -66,7 +64,7 @@ class HighGain(Compiling):
     model: Model | CartPendulum | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "bandwidth", positive("bandwidth", self.bandwidth))
+        object.__setattr__(self, "bandwidth", positive_pair("bandwidth", self.bandwidth))
         object.__setattr__(self, "use_model", switch("use_model", self.use_model))
 
     def part(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Part:
