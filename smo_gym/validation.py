@@ -107,6 +107,18 @@ def array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
     return result
 
 
+def positive_pair(name: str, value: ArrayLike) -> tuple[float, float]:
+    """Two finite numbers above 0, one for each position.
+
+    Raises:
+        ValueError: they are not.
+    """
+    first, second = array(name, value, (2,)).tolist()
+    if first <= 0.0 or second <= 0.0:
+        raise ValueError(f"{name}={short(value)} must be two numbers greater than 0, one for each position")
+    return first, second
+
+
 def switch(name: str, value: Any) -> bool:
     """True or False, Python's or NumPy's.
 

@@ -1,5 +1,6 @@
 """The classical fourth-order Runge-Kutta step ("ode4" of the article's Table 1) on a state of four."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -8,6 +9,9 @@ from . import inlined
 
 STABLE = 2.785
 """A step of dt is stable for ``x' = -r x`` up to this r dt, the root of 1 - z/2 + z^2/6 - z^3/24."""
+
+# A period that is not a multiple of the step has one step more if it is longer by this share of a step.
+_SLACK = 1e-6
 
 
 @inlined
@@ -30,3 +34,10 @@ def rk4(rhs: Callable[[State, float, Any], State], x: State, inputs: Any, dt: fl
         a[3] + 2.0 * (b[3] + c[3]) + d[3],
     )
     return _along(x, dt / 6.0, slope)
+
+
+@inlined
+def steps_of(period: float, step: float) -> tuple[int, float]:
+    """How many steps of at most ``step`` a period has, and how long each of them is."""
+    steps = math.ceil(period / step - _SLACK)
+    return steps, period / steps

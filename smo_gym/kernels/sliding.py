@@ -1,6 +1,5 @@
 """The article's observer, equations (26)-(35), as blocks for any model."""
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -10,12 +9,10 @@ from .batch import LANES
 from .blocks import XHAT, Y0, Block, U, Y, at, four, offsets, put_four, put_two, two
 from .elementary import tanh
 from .modelling import Params, Rhs, for_each_model
-from .rk4 import rk4
+from .rk4 import rk4, steps_of
 
 Schedule = Callable[[float, float, float, float], State]
 """Factors of (m1_h, m1_theta, m2_h, m2_theta) as a function of xhat."""
-# A period that is not a multiple of the step has one step more if it is longer by this share of a step.
-_SLACK = 1e-6
 
 PERIOD, STEP, PSI, M1, BETA_1, BETA_2, SLOPES, ALPHA, MODEL = offsets(1, 1, 2, 2, 2, 2, 4, 1)
 
@@ -53,9 +50,7 @@ def explicit(rhs: Rhs, params: Params, full: bool, measurement: str, schedule: S
         return h_dot, theta_dot, v_dot, omega_dot
 
     def estimate(signals: Array, own: Array, lanes: int) -> None:
-        period, step = own[PERIOD * LANES], own[STEP * LANES]
-        steps = math.ceil(period / step - _SLACK)
-        step = period / steps
+        steps, step = steps_of(own[PERIOD * LANES], own[STEP * LANES])
         for j in range(steps):
             a, b = j / steps, (j + 1) / steps
             for i in range(lanes):
@@ -93,9 +88,7 @@ def implicit(rhs: Rhs, params: Params, full: bool, schedule: Schedule | None) ->
     factors = schedule or _unscheduled
 
     def estimate(signals: Array, own: Array, lanes: int) -> None:
-        period, step = own[PERIOD * LANES], own[STEP * LANES]
-        steps = math.ceil(period / step - _SLACK)
-        step = period / steps
+        steps, step = steps_of(own[PERIOD * LANES], own[STEP * LANES])
         for j in range(steps):
             b = (j + 1) / steps
             for i in range(lanes):

@@ -9,8 +9,8 @@ from ..loop import Part, columns
 from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array
+from ..validation import positive_pair
 from .estimator import Compiling
-from .positions import positive
 
 PERIOD, CUTOFF, _ = offsets(1, 2)
 
@@ -59,7 +59,7 @@ class FilteredDerivative(Compiling):
     cutoff: tuple[float, float] = (60.0, 60.0)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "cutoff", positive("cutoff", self.cutoff))
+        object.__setattr__(self, "cutoff", positive_pair("cutoff", self.cutoff))
 
     def part(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Part:
         """What the observer puts into a loop of n slots; any plant and force will do."""

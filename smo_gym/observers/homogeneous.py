@@ -12,9 +12,8 @@ from ..loop import Part, columns
 from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array, State
-from ..validation import switch
+from ..validation import positive_pair, switch
 from .estimator import Compiling
-from .positions import positive
 
 PERIOD, GAINS_1, GAINS_2, GAINS_3, VELOCITIES, ACCELERATIONS, MODEL = offsets(1, 2, 2, 2, 2, 2)
 
@@ -66,7 +65,7 @@ class Homogeneous(Compiling):
     model: Model | CartPendulum | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "L", positive("L", self.L))
+        object.__setattr__(self, "L", positive_pair("L", self.L))
         object.__setattr__(self, "use_model", switch("use_model", self.use_model))
 
     def part(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Part:

@@ -12,9 +12,8 @@ from ..loop import Part, columns
 from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array, State
-from ..validation import choice
+from ..validation import choice, positive_pair
 from .estimator import Compiling
-from .positions import positive
 
 SCHEMES = ("explicit", "implicit", "proper")
 PERIOD, BOUNDS, VELOCITIES, MODEL = offsets(1, 2, 2)
@@ -86,7 +85,7 @@ class SuperTwisting(Compiling):
     model: Model | CartPendulum | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "L", positive("L", self.L))
+        object.__setattr__(self, "L", positive_pair("L", self.L))
         choice("scheme", self.scheme, SCHEMES)
 
     def part(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Part:
@@ -113,7 +112,7 @@ class Levant(Compiling):
     scheme: str = "proper"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "L", positive("L", self.L))
+        object.__setattr__(self, "L", positive_pair("L", self.L))
         choice("scheme", self.scheme, SCHEMES)
 
     def part(self, n: int, dt: float, force: float, nominal: Model | CartPendulum) -> Part:

@@ -1,0 +1,94 @@
+"""Covariances of a state of four: ten numbers, the rows of the upper triangle one after the other."""
+
+from ..typing import Array, State
+from . import inlined
+from .blocks import four, put_four, put_two, two
+from .elementary import fma
+
+Matrix = tuple[State, State, State, State]
+Symmetric = tuple[float, float, float, float, float, float, float, float, float, float]
+
+
+@inlined
+def dot(a: State, b: State) -> float:
+    """The inner product."""
+    return fma(a[3], b[3], fma(a[2], b[2], fma(a[1], b[1], a[0] * b[0])))
+
+
+@inlined
+def times(a: State, P: Symmetric) -> State:
+    """``a P``, a row."""
+    return (
+        dot(a, (P[0], P[1], P[2], P[3])),
+        dot(a, (P[1], P[4], P[5], P[6])),
+        dot(a, (P[2], P[5], P[7], P[8])),
+        dot(a, (P[3], P[6], P[8], P[9])),
+    )
+
+
+@inlined
+def congruent(F: Matrix, P: Symmetric) -> Symmetric:
+    """``F P F'``."""
+    a, b, c, d = F
+    pa, pb, pc, pd = times(a, P), times(b, P), times(c, P), times(d, P)
+    return (
+        dot(pa, a),
+        dot(pa, b),
+        dot(pa, c),
+        dot(pa, d),
+        dot(pb, b),
+        dot(pb, c),
+        dot(pb, d),
+        dot(pc, c),
+        dot(pc, d),
+        dot(pd, d),
+    )
+
+
+@inlined
+def plus_square(P: Symmetric, w: float, a: State) -> Symmetric:
+    """``P + w a' a``."""
+    wa, wb, wc, wd = w * a[0], w * a[1], w * a[2], w * a[3]
+    return (
+        fma(wa, a[0], P[0]),
+        fma(wa, a[1], P[1]),
+        fma(wa, a[2], P[2]),
+        fma(wa, a[3], P[3]),
+        fma(wb, a[1], P[4]),
+        fma(wb, a[2], P[5]),
+        fma(wb, a[3], P[6]),
+        fma(wc, a[2], P[7]),
+        fma(wc, a[3], P[8]),
+        fma(wd, a[3], P[9]),
+    )
+
+
+@inlined
+def plus(P: Symmetric, Q: Symmetric) -> Symmetric:
+    """``P + Q``."""
+    return (
+        P[0] + Q[0],
+        P[1] + Q[1],
+        P[2] + Q[2],
+        P[3] + Q[3],
+        P[4] + Q[4],
+        P[5] + Q[5],
+        P[6] + Q[6],
+        P[7] + Q[7],
+        P[8] + Q[8],
+        P[9] + Q[9],
+    )
+
+
+@inlined
+def symmetric(rows: Array, row: int, i: int) -> Symmetric:
+    """Ten rows' numbers in lane i."""
+    return four(rows, row, i) + four(rows, row + 4, i) + two(rows, row + 8, i)
+
+
+@inlined
+def put_symmetric(rows: Array, row: int, i: int, P: Symmetric) -> None:
+    """Set ten rows' numbers in lane i."""
+    put_four(rows, row, i, (P[0], P[1], P[2], P[3]))
+    put_four(rows, row + 4, i, (P[4], P[5], P[6], P[7]))
+    put_two(rows, row + 8, i, (P[8], P[9]))
