@@ -15,6 +15,8 @@ from .candidates import Tree, leaves, with_leaves
 
 SPREAD = 0.7
 """First standard deviation of the logarithms: about a factor of 2 up or down."""
+RANGE = 1000.0
+"""Numbers stay within this factor of where they begin: one that runs away, as a filter's cutoff may, ends there."""
 LOST = 1e6
 """Cost of settings that an observer refuses, or with which its estimate is not finite: less than that is better."""
 
@@ -69,8 +71,10 @@ def tune(
     told(1)
     # one number alone is no search space for CMA-ES: it gets a second one, which does nothing
     idle = [0.0] if len(begin) == 1 else []
-    options: dict[str, Any] = {"seed": seed + 1, "verbose": -9}  # cma takes 0 for the clock
-    search: Any = cma.CMAEvolutionStrategy([*begin, *idle], SPREAD, options)
+    middle = np.array([*begin, *idle])
+    bounds = [(middle - math.log(RANGE)).tolist(), (middle + math.log(RANGE)).tolist()]
+    options: dict[str, Any] = {"seed": seed + 1, "verbose": -9, "bounds": bounds}  # cma takes a seed of 0 for the clock
+    search: Any = cma.CMAEvolutionStrategy(middle, SPREAD, options)
     while done < budget and not search.stop():
         points = search.ask()
         costs = [tried(point[: len(begin)]) if done + i < budget else LOST for i, point in enumerate(points)]

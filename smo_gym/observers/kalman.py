@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +20,7 @@ from ..loop import Part, columns
 from ..models import Model
 from ..plant import CartPendulum
 from ..typing import Array, State
-from ..validation import number, positive_pair, shape_of, short, whole
+from ..validation import number, positive_pair, short, whole
 from .estimator import Compiling
 
 
@@ -45,7 +44,7 @@ class ExtendedKalmanFilter(Compiling):
         noise: standard deviations of the measured positions in m and rad; of counting alone a step / sqrt(12).
         velocity: standard deviations of the initial velocities, which are taken to be 0, in m/s and rad/s.
         saturation: how many standard deviations sqrt(s) each position's innovation is worth at most: e becomes
-            b tanh(e / b) for b = saturation sqrt(s), which bounds what a faulty sensor does. ``math.inf`` for no bound.
+            b tanh(e / b) for b = saturation sqrt(s), which bounds what a faulty sensor does. None for no bound.
         adaptation: how fast the second acceleration's noise follows the innovations: at each sample its logarithm grows
             by adaptation (min(e^2 / s, 4) - 1.5), and is never below that of ``acceleration`` nor 64 times above. An
             error that stays, of the model, makes the filter doubt the model; one that a sensor makes for some samples
@@ -60,7 +59,7 @@ class ExtendedKalmanFilter(Compiling):
     acceleration: tuple[float, float] = (0.5, 2.0)
     noise: tuple[float, float] = (3e-5, 4.5e-4)
     velocity: tuple[float, float] = (1.0, 3.0)
-    saturation: tuple[float, float] = (math.inf, math.inf)
+    saturation: tuple[float | None, float | None] = (None, None)
     adaptation: float = 0.0
     substeps: int = 1
     model: Model | CartPendulum | None = None
@@ -79,11 +78,12 @@ class ExtendedKalmanFilter(Compiling):
         """What the filter puts into a loop of n slots."""
         model = Model.of(self.model or nominal)
         step, variance = dt / self.substeps, np.square(self.noise)
+        bounded, levels = [s is not None for s in self.saturation], [s or 0.0 for s in self.saturation]
         covariance = uncorrelated(*variance, *np.square(self.velocity))
-        settings = np.square(self.acceleration), variance, np.minimum(self.saturation, _NO_BOUND), self.adaptation, 0.0
+        settings = np.square(self.acceleration), variance, levels, self.adaptation, 0.0
         return Part(
             columns(n, dt, step, covariance, *settings, model.params),
-            sample=_filter(model.rhs, len(model.params), *np.isfinite(self.saturation).tolist(), self.adaptation > 0.0),
+            sample=_filter(model.rhs, len(model.params), *bounded, self.adaptation > 0.0),
             alike=(dt, step),
             period=PERIOD,
         )
@@ -99,14 +99,17 @@ def uncorrelated(a: float, b: float, c: float, d: float) -> Symmetric:
     return a, 0.0, 0.0, 0.0, b, 0.0, 0.0, c, 0.0, d
 
 
-def _levels(value: Any) -> tuple[float, float]:
-    if shape_of(value) != (2,) or not all(isinstance(each, numbers.Real) and float(each) > 0.0 for each in value):
-        raise ValueError(f"saturation={short(value)} must be two numbers greater than 0 (math.inf for no bound)")
-    return float(value[0]), float(value[1])
+def _levels(value: Any) -> tuple[float | None, float | None]:
+    try:
+        first, second = (None if each is None else number("saturation", each, above=0.0) for each in value)
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"saturation={short(value)} must be two numbers greater than 0, or None for no bound"
+        ) from None
+    return first, second
 
 
 PERIOD, STEP, COVARIANCE, DENSITY, VARIANCE, LEVELS, RATE, DOUBT, MODEL = offsets(1, 1, 10, 2, 2, 2, 1, 1)
-_NO_BOUND = 1e300
 CAP, USUAL, MOST = 4.0, 1.5, math.log(64.0)
 """Of the adaptation: the most that a squared innovation counts, what is usual, and the largest logarithm."""
 
