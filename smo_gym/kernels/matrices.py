@@ -2,7 +2,7 @@
 
 from ..typing import Array, State
 from . import inlined
-from .blocks import four, put_four, put_two, two
+from .batch import LANES
 from .elementary import fma
 
 Matrix = tuple[State, State, State, State]
@@ -82,13 +82,31 @@ def plus(P: Symmetric, Q: Symmetric) -> Symmetric:
 
 @inlined
 def symmetric(rows: Array, row: int, i: int) -> Symmetric:
-    """Ten rows' numbers in lane i."""
-    return four(rows, row, i) + four(rows, row + 4, i) + two(rows, row + 8, i)
+    """Ten rows' numbers in lane i. By way of :func:`four` their offsets would be known too late to vectorise."""
+    return (
+        rows[row * LANES + i],
+        rows[(row + 1) * LANES + i],
+        rows[(row + 2) * LANES + i],
+        rows[(row + 3) * LANES + i],
+        rows[(row + 4) * LANES + i],
+        rows[(row + 5) * LANES + i],
+        rows[(row + 6) * LANES + i],
+        rows[(row + 7) * LANES + i],
+        rows[(row + 8) * LANES + i],
+        rows[(row + 9) * LANES + i],
+    )
 
 
 @inlined
 def put_symmetric(rows: Array, row: int, i: int, P: Symmetric) -> None:
     """Set ten rows' numbers in lane i."""
-    put_four(rows, row, i, (P[0], P[1], P[2], P[3]))
-    put_four(rows, row + 4, i, (P[4], P[5], P[6], P[7]))
-    put_two(rows, row + 8, i, (P[8], P[9]))
+    rows[row * LANES + i] = P[0]
+    rows[(row + 1) * LANES + i] = P[1]
+    rows[(row + 2) * LANES + i] = P[2]
+    rows[(row + 3) * LANES + i] = P[3]
+    rows[(row + 4) * LANES + i] = P[4]
+    rows[(row + 5) * LANES + i] = P[5]
+    rows[(row + 6) * LANES + i] = P[6]
+    rows[(row + 7) * LANES + i] = P[7]
+    rows[(row + 8) * LANES + i] = P[8]
+    rows[(row + 9) * LANES + i] = P[9]

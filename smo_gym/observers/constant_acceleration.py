@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import inlined
-from ..kernels.blocks import XHAT, Y, at, block, four, offsets, put, put_four, two
+from ..kernels.batch import LANES
+from ..kernels.blocks import XHAT, Y, at, block, four, offsets, put_four, put_two, two
 from ..loop import Part, columns
 from ..models import Model
 from ..plant import CartPendulum
@@ -22,14 +23,24 @@ Third = tuple[float, float, float, float, float, float]
 
 @inlined
 def _three(rows: Array, row: int, i: int) -> Third:
-    a, b, c = two(rows, row, i), two(rows, row + 2, i), two(rows, row + 4, i)
-    return a[0], a[1], b[0], b[1], c[0], c[1]
+    return (
+        rows[row * LANES + i],
+        rows[(row + 1) * LANES + i],
+        rows[(row + 2) * LANES + i],
+        rows[(row + 3) * LANES + i],
+        rows[(row + 4) * LANES + i],
+        rows[(row + 5) * LANES + i],
+    )
 
 
 @inlined
 def _put_three(rows: Array, row: int, i: int, P: Third) -> None:
-    for j in range(6):
-        put(rows, row + j, i, P[j])
+    rows[row * LANES + i] = P[0]
+    rows[(row + 1) * LANES + i] = P[1]
+    rows[(row + 2) * LANES + i] = P[2]
+    rows[(row + 3) * LANES + i] = P[3]
+    rows[(row + 4) * LANES + i] = P[4]
+    rows[(row + 5) * LANES + i] = P[5]
 
 
 @inlined
@@ -60,8 +71,7 @@ def _filter(signals: Array, own: Array, lanes: int) -> None:
         q, v, first, P = _filtered(q, v, a[0], _three(own, FIRST, i), y[0], h, jerk[0], variance[0])
         theta, omega, second, R = _filtered(theta, omega, a[1], _three(own, SECOND, i), y[1], h, jerk[1], variance[1])
         put_four(signals, XHAT, i, (q, theta, v, omega))
-        put(own, ACCELERATIONS, i, first)
-        put(own, ACCELERATIONS + 1, i, second)
+        put_two(own, ACCELERATIONS, i, (first, second))
         _put_three(own, FIRST, i, P)
         _put_three(own, SECOND, i, R)
 

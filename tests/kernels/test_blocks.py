@@ -16,8 +16,10 @@ from conftest import ROOT
 from numba.core.errors import NumbaError
 
 import smo_gym
+from smo_gym import CartPendulum
 from smo_gym.kernels.blocks import SIGNATURE, U, address, at, block, put
 from smo_gym.loop import Loop, Part, columns
+from smo_gym.observers import OBSERVERS
 
 ARGUMENTS = ["signals", "own", "lanes"]
 STORES = re.compile(r"^\s+v?mov[au]p[ds]\s+%[xyz]mm\d+,\s*.*\(", re.MULTILINE)
@@ -64,6 +66,15 @@ x86 = pytest.mark.skipif(
 def test_every_block_is_vector_code_and_calls_nothing(name):
     code = assembly(BLOCKS[name])
     assert STORES.search(code), "no lane beside another: see the module's docstring and look for branches"
+    assert not CALLS.findall(code)
+
+
+@x86
+@pytest.mark.parametrize("name", OBSERVERS)
+def test_an_observers_block_is_vector_code_around_a_model_too(name):
+    code = assembly(OBSERVERS[name]().part(1, 0.001, 30.0, CartPendulum()).sample.py_func)
+    assert STORES.search(code)
+    assert "divpd" in code or "divsd" not in code, "is an offset known too late?"
     assert not CALLS.findall(code)
 
 
@@ -140,6 +151,7 @@ def test_what_a_block_raises_in_a_thread_reaches_python(monkeypatch):
 FAULTY = """
 from smo_gym.kernels.blocks import block, put
 from smo_gym.loop import Loop, Part, columns
+from smo_gym.observers import OBSERVERS
 
 @block
 def beyond(signals, own, lanes):
