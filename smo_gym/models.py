@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -60,3 +61,12 @@ class Model:
         """X' at one state, (4,)."""
         state = array("x", x, (4,)).tolist()
         return array("X'", self.rhs((state[0], state[1], state[2], state[3]), 0.0, (float(u), *self.params)), (4,))
+
+
+def known(model: Any) -> Model | CartPendulum | None:
+    """What an observer's setting ``model`` stands for: itself, a plant by its fields or numbers, or None.
+
+    Raises:
+        ValueError: it is none of these.
+    """
+    return model if model is None or isinstance(model, Model) else CartPendulum.of(model, name="model")

@@ -75,3 +75,9 @@ def process_noise(density: tuple[float, float], r: float, h: float) -> Symmetric
     c = r * b + density[1]
     i, j = 0.5 * h * h, h * h * h / 3.0
     return j * a, j * b, i * a, i * b, j * c, i * b, i * c, h * a, h * b, h * c
+
+
+@inlined
+def halfway(a: State, b: State) -> State:
+    """The mean of two states."""
+    return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2]), 0.5 * (a[3] + b[3])

@@ -1,5 +1,7 @@
 """Covariances of a state of four: ten numbers, the rows of the upper triangle one after the other."""
 
+import math
+
 from ..typing import Array, State
 from . import inlined
 from .batch import LANES
@@ -110,3 +112,31 @@ def put_symmetric(rows: Array, row: int, i: int, P: Symmetric) -> None:
     rows[(row + 7) * LANES + i] = P[7]
     rows[(row + 8) * LANES + i] = P[8]
     rows[(row + 9) * LANES + i] = P[9]
+
+
+def diagonal(a: float, b: float, c: float, d: float) -> Symmetric:
+    """A covariance of numbers that have nothing to do with each other."""
+    return a, 0.0, 0.0, 0.0, b, 0.0, 0.0, c, 0.0, d
+
+
+@inlined
+def cholesky(P: Symmetric, scale: float) -> Matrix:
+    """Columns of the lower triangular L with ``L L' = scale P``."""
+    a = math.sqrt(scale * P[0])
+    w = scale / a
+    b, c, d = w * P[1], w * P[2], w * P[3]
+    e = math.sqrt(scale * P[4] - b * b)
+    f, g = (scale * P[5] - b * c) / e, (scale * P[6] - b * d) / e
+    h = math.sqrt(scale * P[7] - c * c - f * f)
+    j = (scale * P[8] - c * d - f * g) / h
+    k = math.sqrt(scale * P[9] - d * d - g * g - j * j)
+    return (a, b, c, d), (0.0, e, f, g), (0.0, 0.0, h, j), (0.0, 0.0, 0.0, k)
+
+
+@inlined
+def corrected(x: State, P: Symmetric, column: State, e: float, s: float) -> tuple[State, Symmetric]:
+    """State and covariance after a measured position: its column of P, its innovation e and the variance s of that."""
+    inverse = 1.0 / s
+    k = inverse * e
+    new = x[0] + k * column[0], x[1] + k * column[1], x[2] + k * column[2], x[3] + k * column[3]
+    return new, plus_square(P, -inverse, column)

@@ -15,7 +15,7 @@ _SLACK = 1e-6
 
 
 @inlined
-def _along(x: State, h: float, d: State) -> State:
+def along(x: State, h: float, d: State) -> State:
     """``x + h d``."""
     return x[0] + h * d[0], x[1] + h * d[1], x[2] + h * d[2], x[3] + h * d[3]
 
@@ -24,16 +24,16 @@ def _along(x: State, h: float, d: State) -> State:
 def rk4(rhs: Callable[[State, float, Any], State], x: State, inputs: Any, dt: float) -> State:
     """x(t + dt) for ``x' = rhs(x, s, inputs)``, where s in [0, 1] is how much of the step has passed."""
     a = rhs(x, 0.0, inputs)
-    b = rhs(_along(x, 0.5 * dt, a), 0.5, inputs)
-    c = rhs(_along(x, 0.5 * dt, b), 0.5, inputs)
-    d = rhs(_along(x, dt, c), 1.0, inputs)
+    b = rhs(along(x, 0.5 * dt, a), 0.5, inputs)
+    c = rhs(along(x, 0.5 * dt, b), 0.5, inputs)
+    d = rhs(along(x, dt, c), 1.0, inputs)
     slope = (
         a[0] + 2.0 * (b[0] + c[0]) + d[0],
         a[1] + 2.0 * (b[1] + c[1]) + d[1],
         a[2] + 2.0 * (b[2] + c[2]) + d[2],
         a[3] + 2.0 * (b[3] + c[3]) + d[3],
     )
-    return _along(x, dt / 6.0, slope)
+    return along(x, dt / 6.0, slope)
 
 
 @inlined

@@ -8,10 +8,12 @@ from .high_gain import HighGain
 from .homogeneous import Homogeneous
 from .kalman import ExtendedKalmanFilter
 from .luenberger import Luenberger, SteadyKalman
+from .moving_horizon import MovingHorizon
 from .oracle import Oracle
 from .protocol import Compiled, Estimator, Observer
 from .sliding_mode import SlidingModeObserver
 from .super_twisting import Levant, SuperTwisting
+from .unscented import UnscentedKalmanFilter
 
 OBSERVERS = {
     "smo": SlidingModeObserver,
@@ -25,6 +27,8 @@ OBSERVERS = {
     "steady-kalman": SteadyKalman,
     "kalman-ca": ConstantAcceleration,
     "ekf": ExtendedKalmanFilter,
+    "ukf": UnscentedKalmanFilter,
+    "mhe": MovingHorizon,
     "oracle": Oracle,
 }
 
@@ -41,10 +45,12 @@ __all__ = [
     "Homogeneous",
     "Levant",
     "Luenberger",
+    "MovingHorizon",
     "Observer",
     "Oracle",
     "SlidingModeObserver",
     "SteadyKalman",
     "SuperTwisting",
+    "UnscentedKalmanFilter",
     "start_each",
 ]

@@ -12,14 +12,14 @@ from ..kernels import inlined
 from ..kernels.batch import LANES
 from ..kernels.blocks import XHAT, Block, U, Y, at, four, offsets, put, put_four, two
 from ..kernels.elementary import exp, tanh
-from ..kernels.linearised import jacobian, process_noise, ratio, transition
-from ..kernels.matrices import Symmetric, congruent, plus, plus_square, put_symmetric, symmetric
+from ..kernels.linearised import halfway, jacobian, process_noise, ratio, transition
+from ..kernels.matrices import congruent, corrected, diagonal, plus, put_symmetric, symmetric
 from ..kernels.modelling import Params, Rhs, for_each_model
 from ..kernels.rk4 import rk4, steps_of
 from ..loop import Part, columns
-from ..models import Model
+from ..models import Model, known
 from ..plant import CartPendulum
-from ..typing import Array, State
+from ..typing import Array
 from ..validation import number, positive_pair, short, whole
 from .estimator import Compiling
 
@@ -79,7 +79,7 @@ class ExtendedKalmanFilter(Compiling):
         model = Model.of(self.model or nominal)
         step, variance = dt / self.substeps, np.square(self.noise)
         bounded, levels = [s is not None for s in self.saturation], [s or 0.0 for s in self.saturation]
-        covariance = uncorrelated(*variance, *np.square(self.velocity))
+        covariance = diagonal(*variance, *np.square(self.velocity))
         settings = np.square(self.acceleration), variance, levels, self.adaptation, 0.0
         return Part(
             columns(n, dt, step, covariance, *settings, model.params),
@@ -87,16 +87,6 @@ class ExtendedKalmanFilter(Compiling):
             alike=(dt, step),
             period=PERIOD,
         )
-
-
-def known(model: Model | CartPendulum | None) -> Model | CartPendulum | None:
-    """A model as it is, the plant that a mapping or its four numbers stand for, or None."""
-    return model if model is None or isinstance(model, Model) else CartPendulum.of(model, name="model")
-
-
-def uncorrelated(a: float, b: float, c: float, d: float) -> Symmetric:
-    """A diagonal covariance."""
-    return a, 0.0, 0.0, 0.0, b, 0.0, 0.0, c, 0.0, d
 
 
 def _levels(value: Any) -> tuple[float | None, float | None]:
@@ -115,15 +105,6 @@ CAP, USUAL, MOST = 4.0, 1.5, math.log(64.0)
 
 
 @inlined
-def corrected(x: State, P: Symmetric, column: State, e: float, s: float) -> tuple[State, Symmetric]:
-    """State and covariance after a measured position: its column of P, its innovation e and the variance s of that."""
-    inverse = 1.0 / s
-    k = inverse * e
-    new = x[0] + k * column[0], x[1] + k * column[1], x[2] + k * column[2], x[3] + k * column[3]
-    return new, plus_square(P, -inverse, column)
-
-
-@inlined
 def _bounded(e: float, most: float) -> float:
     return most * tanh(e / most)
 
@@ -136,7 +117,7 @@ def _filter(rhs: Rhs, params: Params, first_bounded: bool, second_bounded: bool,
             for i in range(lanes):
                 x, u, p, q = four(signals, XHAT, i), at(signals, U, i), params(own, MODEL, i), two(own, DENSITY, i)
                 new = rk4(rhs, x, (u,) + p, h)  # noqa: RUF005  # Numba unpacks no tuple here
-                middle = 0.5 * (x[0] + new[0]), 0.5 * (x[1] + new[1]), 0.5 * (x[2] + new[2]), 0.5 * (x[3] + new[3])
+                middle = halfway(x, new)
                 F = transition(jacobian(rhs, middle, u, p), h)
                 if adapting:
                     q = q[0], q[1] * exp(at(own, DOUBT, i))

@@ -53,7 +53,7 @@ def run(
         ValueError: shapes that do not fit, fewer than two samples, a number that is not finite, time that does not
             grow, or an observer that cannot work with this sampling period and input.
     """
-    times, positions, inputs = _checked(t, y, u)
+    times, positions, inputs = checked(t, y, u)
     dt, h = periods(times)
     largest = float(np.abs(inputs).max()) if force is None else force
     part = observer.part(1, dt, largest, model or CartPendulum())
@@ -83,7 +83,12 @@ def along(part: Part, h: Array, y: Array, u: Array) -> Array:
     return xhat
 
 
-def _checked(t: ArrayLike, y: ArrayLike, u: ArrayLike) -> tuple[Array, Array, Array]:
+def checked(t: ArrayLike, y: ArrayLike, u: ArrayLike) -> tuple[Array, Array, Array]:
+    """Arrays of a recording.
+
+    Raises:
+        ValueError: as of :func:`run`.
+    """
     times, positions, inputs = (np.ascontiguousarray(each, dtype=np.float64) for each in (t, y, u))
     n = len(times) if times.ndim == 1 else 0
     if n < 2:
