@@ -28,7 +28,7 @@ BEFORE, AFTER = 12, 25
 
 
 def draw(runs: Runs, observers: Mapping[str, Candidate]) -> Figure:
-    """The angle, and its speed as it is estimated, around the passage whose median error is the middle one."""
+    """The angle, and the error of its speed against the smoother that skips the fault, around one passage."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
@@ -51,10 +51,11 @@ def draw(runs: Runs, observers: Mapping[str, Candidate]) -> Figure:
             if name in observers:
                 v = runs.velocities(observers[name].build(runs.rig.model))[k][:, 1]
                 peak = float(np.abs(v - truth)[place].max())
-                speed.plot(t, v[window], color=colour, label=f"{observers[name].title}: {peak:.2f}")
-        speed.plot(t, truth[window], "k--", linewidth=1.0, label="smoother that skips the fault")
-        low, high = float(truth[window].min()), float(truth[window].max())
-        speed.set_ylim(low - 0.6 * (high - low) - 1.0, high + 0.6 * (high - low) + 1.0)
-        speed.set(title="its speed and the largest error there, rad/s", xlabel="time, s")
-        speed.legend(fontsize=7)
+                speed.plot(t, (v - truth)[window], color=colour, label=f"{observers[name].title}: {peak:.2f}")
+        speed.axhline(0.0, color="black", linewidth=0.8)
+        speed.set_yscale("symlog", linthresh=1.0)
+        speed.set(title="error of its speed, rad/s, and the largest in there", xlabel="time, s")
+        speed.set_yticks([-10.0, -1.0, 0.0, 1.0, 10.0], ["-10", "-1", "0", "1", "10"])
+        handles, labels = speed.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=7)
     return figure
