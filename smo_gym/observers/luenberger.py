@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are
-from scipy.signal import place_poles
 
 from ..kernels.blocks import XHAT, Block, U, Y, at, four, offsets, put_four, two
 from ..kernels.modelling import Params, Rhs, for_each_model
@@ -95,6 +94,8 @@ class Luenberger(Compiling):
 
     def gains(self, model: Model, dt: float) -> Array:
         """K, (4, 2)."""
+        from scipy.signal import place_poles  # brings much that nobody else needs
+
         F = expm(dt * linearised(model, np.array(self.about))[0])
         poles = np.exp(-dt * np.array([self.rate[0], 1.05 * self.rate[0], 1.1 * self.rate[1], 1.15 * self.rate[1]]))
         return np.asarray(place_poles(F.T, (C @ F).T, poles).gain_matrix.T)

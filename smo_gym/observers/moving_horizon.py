@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares
 
 from ..kernels.linearised import halfway, jacobian, process_noise, ratio, transition
 from ..kernels.matrices import Symmetric
@@ -164,6 +163,8 @@ class _Window:
 
     def _solved(self, guess: Array) -> Array:
         """The best states, from a guess of them."""
+        from scipy.optimize import least_squares  # brings much that nobody else needs
+
         n, (mean, P), noise = len(self._samples), self._estimated[0], np.array(self._settings.noise)
         inputs, y = [(u, h) for u, h, _ in self._samples], np.array([y for _, _, y in self._samples])
         Q = [self._predicted(x, *between)[2] for x, between in zip(guess[:-1], inputs, strict=True)]

@@ -200,6 +200,6 @@ def _slopes(slopes: Any) -> Slopes:
         pairs = [tuple(map(float, k)) if shape_of(k) == (2,) and all(map(_is_slope, k)) else float(k) for k in slopes]
         if len(pairs) == 2 and all(isinstance(k, tuple) or _is_slope(k) for k in pairs):
             return pairs[0], pairs[1]  # type: ignore[return-value]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         pass
     raise ValueError(f"slopes={short(slopes)} must be two positive numbers (math.inf for the exact sgn), or two pairs")

@@ -80,12 +80,11 @@ def _number(path: Path, line: int, row: Sequence[str], place: int) -> float:
 def _looks_like_degrees(t: Array, angle: Array) -> str:
     """What of an angle cannot be if it is in radians; nothing where all can."""
     jumps = np.abs(np.diff(angle))
-    if len(jumps) == 0 or not np.isfinite(angle).all():
+    if len(jumps) == 0 or not np.isfinite(angle).all() or (np.diff(t) <= 0.0).any():
         return ""
     if np.any(np.abs(jumps - COUNTS_A_TURN) < 10.0) and np.abs(angle).max() <= COUNTS_A_TURN:
         return f"jumps by {jumps.max():.0f}, as one does that wraps at 360"
-    h = np.maximum(np.diff(t), 1e-9)
-    usual = float(np.percentile(jumps / h, 90))
+    usual = float(np.percentile(jumps / np.diff(t), 90))
     if usual > MOST_SPEED:
         return f"changes by {usual:.0f} a second and more in a tenth of all samples"
     steps = np.unique(np.round(jumps[jumps > 0.0], 9))
