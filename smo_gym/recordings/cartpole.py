@@ -1,7 +1,7 @@
 """A cart on a belt with a pole on a potentiometer (SensorsINI/CartPoleSimulation), the article's own kind of plant.
 
-All numbers are identified: model and noise by the likelihood of an EKF's innovations on 60 training runs
-(:mod:`.fitting`), the potentiometer's scale by the same, its gap read off the recordings.
+All numbers are identified, in a study beside this package: model and noise by the likelihood of an EKF's innovations on
+60 training runs, the potentiometer's scale by the same, its gap read off the recordings.
 """
 
 import math
