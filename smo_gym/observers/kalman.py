@@ -48,7 +48,7 @@ class ExtendedKalmanFilter(Compiling):
         adaptation: how fast the second acceleration's noise follows the innovations: at each sample its logarithm grows
             by adaptation (min(e^2 / s, 4) - 1.5), and is never below that of ``acceleration`` nor 64 times above. An
             error that stays, of the model, makes the filter doubt the model; one that a sensor makes for some samples
-            hardly does. 0 for none. Chosen on training runs.
+            hardly does. 0 for none; the cap of 4 and the 1.5 are chosen.
         substeps: integration steps in a sampling period.
         model: nominal plant; None for the one that the environment draws its plants around.
 
