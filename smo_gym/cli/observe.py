@@ -23,7 +23,7 @@ from ..evaluation.report import figures, log_panels
 from ..models import Model
 from ..plant import CartPendulum
 from ..policies import named
-from ..recordings import logged
+from ..recordings import RIGS, logged
 from ..recordings.logged import Log
 from ..typing import Array
 from ..validation import unknown
@@ -41,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--observer", default="ekf", metavar="NAME", help="tuned settings of that name (default: ekf)")
     parser.add_argument("--tuned", default="simulated", metavar="WHERE", help="or FILE.yaml (default: simulated)")
     parser.add_argument("--set", type=_mapping, default={}, metavar="YAML", help="settings of the observer, over those")
-    parser.add_argument("--model", default=PLANT, metavar="MODEL", help=f"{PLANT}, its fields, or module:NAME")
+    parser.add_argument(
+        "--model", default=PLANT, metavar="MODEL", help=f"{PLANT}, {', '.join(RIGS)}, fields as YAML, or module:NAME"
+    )
     parser.add_argument("--time", metavar="COLUMN", help="in s (default: time or t)")
     parser.add_argument("--positions", nargs=2, default=["position", "angle"], metavar="COLUMN", help="both positions")
     parser.add_argument("--input", default="u", metavar="COLUMN", help="that acts until the next sample (default: u)")
@@ -83,6 +85,8 @@ def _model(text: str) -> Model:
     """
     if text == PLANT:
         return Model.of(CartPendulum())
+    if text in RIGS:
+        return RIGS[text].model
     if text.lstrip().startswith("{"):
         return Model.of(CartPendulum.of(_mapping(text), name="--model"))
     if ":" in text:
@@ -90,7 +94,7 @@ def _model(text: str) -> Model:
         if not isinstance(found, Model | CartPendulum):
             raise ValueError(f"--model {text}: must name a smo_gym.models.Model or a CartPendulum, it is {found!r}")
         return Model.of(found)
-    raise ValueError(f"{unknown('model', text, [PLANT])}, its fields as YAML, or module:NAME")
+    raise ValueError(f"{unknown('model', text, [PLANT, *RIGS])}, its fields as YAML, or module:NAME")
 
 
 def _write(args: argparse.Namespace, model: Model, log: Log, xhat: Array) -> None:

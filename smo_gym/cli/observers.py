@@ -50,6 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.out("observers")
     computing.add(parser)
     args = parser.parse_args(arguments)
+    if args.mismatch and args.data is None:
+        raise ValueError("--mismatch is of recordings: give their folder with --data")
     return _simulated(args) if args.data is None else real.measure(args)
 
 

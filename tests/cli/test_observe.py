@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
+from smo_gym.evaluation.arms import ARMS
 from smo_gym.recordings import logged
 
 
@@ -119,3 +120,37 @@ def test_the_table_of_a_few_runs(command, tmp_path):
     assert {row["loop"] for row in rows} == {"open", "closed"}
     assert "smo-tuned" in done.stdout
     assert (tmp_path / "observers.png").exists()
+
+
+def test_a_rigs_model_and_tuning_by_name(command, tmp_path):
+    path = log(tmp_path / "log.csv")
+    settings = "{substeps: 2}"
+    given = ("--model", "qube", "--tuned", "qube", "--observer", "ekf", "--set", settings, "--out", tmp_path / "out")
+    assert "observer ekf" in command("observe", path, *given).stdout
+
+
+def test_wrong_models_are_of_recordings(command, tmp_path):
+    done = command("observers", "--mismatch", "--out", tmp_path, check=False)
+    assert done.returncode == 2
+    assert "--data" in done.stderr
+    done = command("observers", "--data", tmp_path, "--out", tmp_path / "out", check=False)
+    assert done.returncode == 2
+    assert "cartpole or qube" in done.stderr
+
+
+@pytest.fixture
+def arms_as_they_were():
+    """What a command registers is of its process; here others follow."""
+    before = dict(ARMS)
+    yield
+    ARMS.clear()
+    ARMS.update(before)
+
+
+@pytest.mark.usefixtures("arms_as_they_were")
+def test_a_tuned_observer_is_an_arm_of_the_harness(command, tmp_path):
+    given = ("--controller", "lqr", "--scenario", "regulation", "--observer", "steady-kalman", "--runs", "2")
+    command("evaluate", *given, "--out", tmp_path)
+    assert "steady-kalman" in (tmp_path / "runs.csv").read_text()
+    done = command("evaluate", "--observer", "steady-kalmann", "--out", tmp_path, check=False)
+    assert "'steady-kalman'" in done.stderr
