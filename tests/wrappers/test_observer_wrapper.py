@@ -123,7 +123,7 @@ def test_refusals(make_vec):
         wrapper = ObserverWrapper if isinstance(env_of_others, gymnasium.Env) else VectorObserverWrapper
         with pytest.raises(TypeError, match="is not a smo_gym environment"):
             wrapper(env_of_others)
-    with pytest.raises(TypeError, match="observer=None must be one of 'smo', 'oracle' or an Observer"):
+    with pytest.raises(TypeError, match="observer=None must be one of 'smo', .*'oracle' or an Observer"):
         ObserverWrapper(env, None)
     with pytest.raises(ValueError, match="must stand inside whatever else changes that"):
         ObserverWrapper(ObserverWrapper(env))
