@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with store.kept(out) if out else contextlib.nullcontext() as kept:
             answer = parts(told, settings, over, observer, args.runs, args.seed, kept)
             if args.sweep:
-                remark_2(told, settings, over, min(args.runs, SWEPT), args.seed)
+                swept(told, settings, over, min(args.runs, SWEPT), args.seed)
         try:
             if out is not None:
                 files.write(out / RESULT, told.whole)
@@ -231,7 +231,7 @@ def with_tanh(told: Told, found: Convergence, settle: float) -> None:
     )
 
 
-def remark_2(told: Told, settings: TheoremSettings, over: theorem.OperatingSet, count: int, seed: int) -> None:
+def swept(told: Told, settings: TheoremSettings, over: theorem.OperatingSet, count: int, seed: int) -> None:
     """Tell how soon designed observers converge on the true state's own trajectories."""
     low, high = np.array(settings.starts.value)
     starts = theorem_sweep.edge(low, high, count, np.random.default_rng(seed))

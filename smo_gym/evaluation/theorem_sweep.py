@@ -1,4 +1,4 @@
-"""Remark 2 as a table: how soon the designed observer has converged, over margin, integration step and noise."""
+"""How soon the designed observer has converged, over margin, integration step and noise."""
 
 from __future__ import annotations
 

@@ -128,8 +128,8 @@ class SlidingModeObserver(Compiling):
         gains = self._gains
         m1 = np.array(gains.m1)
         m2 = np.array(gains.beta_1) + self.compensation * np.array(gains.beta_2) * force
-        rates = [m * k for m, k in zip((m1, m2), self._k, strict=True)]
-        fastest = max((float(r) for rate in rates for r in rate if math.isfinite(r)), default=0.0)
+        gains_and_slopes = zip((*m1.tolist(), *m2.tolist()), self._k.ravel().tolist(), strict=True)
+        fastest = max((m * k for m, k in gains_and_slopes if math.isfinite(k)), default=0.0)
         return STABLE / fastest if fastest > 0.0 else math.inf
 
     def as_dict(self) -> dict[str, Any]:
