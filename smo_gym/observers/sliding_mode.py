@@ -166,8 +166,8 @@ class SlidingModeObserver(Compiling):
         if step > largest:
             raise ValueError(
                 f"step={step:g} s is too large for these gains and slopes with |u| up to {force:g} N: RK4 is stable up "
-                f"to {largest:.4g} s, with substeps={math.ceil(dt / largest)}; the largest step that divides the "
-                f"sampling period is step={dt / math.ceil(dt / largest)!r}"
+                f"to {largest:.4g} s; the largest step that divides the sampling period is "
+                f"step={dt / math.ceil(dt / largest)!r}"
             )
         return steps
 

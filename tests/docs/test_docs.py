@@ -20,9 +20,12 @@ EXECUTED = sorted(
 )
 OFFLINE = {"NO_MKDOCS_2_WARNING": "1", "http_proxy": "http://127.0.0.1:9", "https_proxy": "http://127.0.0.1:9"}
 MADE = {Path("report.html"), *(Path("notebooks") / f"{path.stem}.md" for path in ROOT.glob("notebooks/*.ipynb"))}
-EXTERNAL = {"https://squidfunk.github.io/mkdocs-material/", "https://rl-baselines3-zoo.readthedocs.io"}
+EXTERNAL = {
     "https://github.com/SensorsINI/CartPoleSimulation",
     "https://github.com/decargroup/closed_loop_koopman",
+    "https://squidfunk.github.io/mkdocs-material/",
+    "https://rl-baselines3-zoo.readthedocs.io",
+}
 SECTIONS = (
     "action-space",
     "observation-space",
