@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..observing import NOISE, VELOCITIES, Row
+from ..observing import EXACT, NOISE, VELOCITIES, Row
 from .figures import STYLE
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def draw(rows: Sequence[Row], names: Sequence[str], level: float) -> Figure:
 
 def _points(rows: Sequence[Row]) -> Mapping[str, tuple[float, float]]:
     """Lag and noise gain of each observer that has both."""
-    lag = {r.observer: max(abs(r.lag_ms), LEAST_LAG) for r in rows if r.loop == "open" and r.sensor == "exact"}
+    lag = {r.observer: max(abs(r.lag_ms), LEAST_LAG) for r in rows if r.loop == "open" and r.sensor == EXACT}
     gain = {r.observer: r.noise_gain for r in rows if r.loop == "open" and r.sensor == NOISE}
     return {
         name: (lag[name], gain[name]) for name in lag if np.isfinite(lag[name]) and 0.0 < gain.get(name, 0.0) < np.inf
