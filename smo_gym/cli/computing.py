@@ -44,12 +44,12 @@ def add(parser: Parser) -> None:
 
 
 @contextmanager
-def computing(args: argparse.Namespace, out: Path | None, modules: Sequence[str] = ()) -> Iterator[Measure]:
-    """How a command measures. Every finished group is kept in ``out`` until the block is done.
+def working(args: argparse.Namespace, out: Path, modules: Sequence[str] = ()) -> Iterator[tuple[Map, store.Store]]:
+    """Where pieces of work are done, and what keeps what they gave until the block is done.
 
     Args:
         args: with those of :func:`add`.
-        out: the folder for results, claimed; None keeps nothing.
+        out: the folder for results, claimed.
         modules: of the user's own, to be imported wherever runs are computed.
 
     Raises:
@@ -57,15 +57,27 @@ def computing(args: argparse.Namespace, out: Path | None, modules: Sequence[str]
         ImportError: the extra ``dask`` is missing.
         Stop: a worker was lost, or the command was interrupted.
     """
+    with _stoppable(args, out), _place(args, modules) as mapped, store.kept(out) as kept:
+        yield mapped, kept
+
+
+@contextmanager
+def computing(args: argparse.Namespace, out: Path | None, modules: Sequence[str] = ()) -> Iterator[Measure]:
+    """How a command measures groups: as :func:`working`, and None in place of a folder keeps nothing."""
+    if out is None:
+        with _stoppable(args, out), _place(args, modules) as mapped:
+            yield partial(study.measure, map=mapped)
+    else:
+        with working(args, out, modules) as (mapped, kept):
+            yield partial(study.measure, map=mapped, store=kept)
+
+
+@contextmanager
+def _stoppable(args: argparse.Namespace, out: Path | None) -> Iterator[None]:
     if args.dask is not None and args.workers > 1:
         raise ValueError(f"--workers {args.workers} is of this machine, --dask {args.dask} of a cluster: give one")
     try:
-        with _place(args, modules) as mapped:
-            if out is None:
-                yield partial(study.measure, map=mapped)
-            else:
-                with store.kept(out) as kept:
-                    yield partial(study.measure, map=mapped, store=kept)
+        yield
     except WorkerLost as lost:
         raise Stop(f"error: {lost}; {AGAIN if out else 'nothing was written'}", 1) from None
     except KeyboardInterrupt:

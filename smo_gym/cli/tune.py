@@ -1,7 +1,8 @@
-"""Tune observers, all with the same budget: CMA-ES on training runs that no table has.
+"""Tune observers or laws, all with the same budget: CMA-ES on training runs that no table has.
 
     smo-gym tune simulated                     # on simulated encoders
     smo-gym tune cartpole --data DIR           # on the training recordings of a rig
+    smo-gym tune laws --workers 2              # laws, on an estimate
 
 Writes the settings with the numbers that it found, to be compared with those that come with the package.
 """
@@ -24,12 +25,14 @@ from ..evaluation.on_recordings import Runs
 from ..evaluation.store import digest, kept
 from ..evaluation.tuning import Tuned, tune
 from ..recordings import RIGS, load
+from . import computing
 from .arguments import Parser, one_of, several, whole
 from .entry import Stop, command
 from .observers import chosen
+from .tune_laws import tune_laws
 
-SIMULATED = "simulated"
-WHERE = (SIMULATED, *RIGS)
+SIMULATED, LAWS = "simulated", "laws"
+WHERE = (SIMULATED, *RIGS, LAWS)
 
 
 @command("tune")
@@ -38,13 +41,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser("tune", __doc__)
     parser.add_argument("where", type=one_of("place", WHERE), metavar="WHERE", help=f"one of {', '.join(WHERE)}")
     parser.add_argument("--observer", default=None, metavar="NAME", help="some (default: all)", **several(str))
+    parser.add_argument("--law", default=None, metavar="NAME", help="of the laws, some (default: all)", **several(str))
     parser.add_argument("--data", type=Path, metavar="DIR", help="folder of recordings, for a rig")
     parser.add_argument("--budget", type=whole(1), metavar="N", help="evaluations an observer (default: the settings')")
     parser.add_argument("--seed", type=whole(0), metavar="N", help="of the search (default: the settings')")
     parser.out("tuned")
+    computing.add(parser)
     args = parser.parse_args(arguments)
-    if (args.where == SIMULATED) != (args.data is None):
-        raise ValueError(f"--data {args.data}: the folder of recordings is of a rig, {SIMULATED} has none")
+    if (args.where in RIGS) != (args.data is not None):
+        raise ValueError(f"--data {args.data}: the folder of recordings is of a rig, {args.where} has none")
+    if args.where == LAWS:
+        return tune_laws(args, args.budget, args.seed)
     settings = candidates.named(args.where)
     given = {name: value for name in ("budget", "seed") if (value := getattr(args, name)) is not None}
     settings = settings.model_copy(update=given)

@@ -1,7 +1,7 @@
 """What the feedback laws share: where an observation holds the estimate, and the checks of weights."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,19 +34,19 @@ def told(observation: ArrayLike) -> tuple[Array, Array]:
 
 
 class Feedback:
-    """A law whose force is a block of xhat - x_d: what it needs besides is its :meth:`part`.
+    """A law whose force is a block of xhat - x_d: what it needs besides is its :meth:`part`."""
 
-    Attributes:
-        memory: how many of its part's first rows are the law's own state.
-    """
-
-    memory: ClassVar[int] = 0
     _alone: Loop | None = None
 
     def __setattr__(self, name: str, value: Any) -> None:
         """A law whose settings change is another one."""
         super().__setattr__(name, value)
         vars(self)["_alone"] = None if name != "_alone" else value
+
+    @property
+    def memory(self) -> int:
+        """How many of its part's first rows are the law's own state."""
+        return 0
 
     def part(self, n: int) -> Part:
         """What the law puts into a loop of n slots.

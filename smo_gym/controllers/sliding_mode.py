@@ -1,33 +1,60 @@
 """The article's sliding mode control with a periodic switching function, equations (49)-(50)."""
 
-import math
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..article import SMC_GAINS
-from ..kernels.blocks import U, at, block, error, four, offsets, put
-from ..kernels.elementary import sincos, tanh
+from ..kernels import inlined
+from ..kernels.blocks import XHAT, U, at, block, error, four, offsets, put
+from ..kernels.cart_pendulum import plant
+from ..kernels.elementary import rounded, sincos, tanh
 from ..loop import Part, columns
-from ..typing import Array
-from ..validation import array, number, shape_of, short, switch
-from .feedback import Feedback
+from ..plant import CartPendulum
+from ..typing import Array, State
+from ..validation import array, choice, number, shape_of, short, switch
+from .feedback import Feedback, nominal
 
-INTEGRAL, GAINS, SLOPE, AMPLITUDE, LAM, PI_OVER_EPSILON, PERIOD, WRAP, _ = offsets(1, 4, 1, 1, 1, 1, 1, 1)
+INTEGRAL, GAINS, SLOPE, AMPLITUDE, LAM, EPSILON, PERIOD, WRAP, MODEL, _ = offsets(1, 4, 1, 1, 1, 1, 1, 1, 4)
+_PI = 3.141592653589793
+SCHEMES = ("explicit", "implicit")
+
+
+@inlined
+def _surface(own: Array, i: int, e: State) -> tuple[float, float, float]:
+    """S of (50) and its two parts, k1 h + k3 h' and k2 theta + k4 theta'."""
+    k = four(own, GAINS, i)
+    cart, rod = k[0] * e[0] + k[2] * e[2], k[1] * e[1] + k[3] * e[3]
+    return 0.5 * cart * cart + 0.5 * rod * rod, cart, rod
 
 
 @block
-def _act(signals: Array, own: Array, lanes: int) -> None:
+def _explicit(signals: Array, own: Array, lanes: int) -> None:
     for i in range(lanes):
-        k, integral = four(own, GAINS, i), at(own, INTEGRAL, i)
-        h, theta, v, omega = error(signals, i, at(own, WRAP, i))
-        cart = k[0] * h + k[2] * v
-        rod = k[1] * theta + k[3] * omega
-        s = 0.5 * cart * cart + 0.5 * rod * rod
-        sin, _ = sincos(at(own, PI_OVER_EPSILON, i) * (s + at(own, LAM, i) * integral))
+        integral = at(own, INTEGRAL, i)
+        s, _, _ = _surface(own, i, error(signals, i, at(own, WRAP, i)))
+        sin, _ = sincos(_PI / at(own, EPSILON, i) * (s + at(own, LAM, i) * integral))
         put(signals, U, i, at(own, AMPLITUDE, i) * tanh(at(own, SLOPE, i) * sin))
         put(own, INTEGRAL, i, integral + at(own, PERIOD, i) * tanh(s))
+
+
+@block
+def _implicit(signals: Array, own: Array, lanes: int) -> None:
+    for i in range(lanes):
+        k, h, most, epsilon = four(own, GAINS, i), at(own, PERIOD, i), at(own, AMPLITUDE, i), at(own, EPSILON, i)
+        x, model = four(signals, XHAT, i), four(own, MODEL, i)
+        s, cart, rod = _surface(own, i, error(signals, i, at(own, WRAP, i)))
+        integral = at(own, INTEGRAL, i) + h * tanh(s)
+        d0, d1 = plant(x, 0.0, (0.0, *model)), plant(x, 0.0, (1.0, *model))
+        rest = cart * (k[0] * d0[0] + k[2] * d0[2]) + rod * (k[1] * d0[1] + k[3] * d0[3])
+        gain = cart * k[2] * (d1[2] - d0[2]) + rod * k[3] * (d1[3] - d0[3])
+        ahead = s + h * rest + at(own, LAM, i) * integral
+        # multiples of epsilon that attract: the even ones where the force lowers s, else the odd ones
+        odd = 1.0 if gain > 0.0 else 0.0
+        away = ahead - epsilon * (2.0 * rounded(0.5 * (ahead / epsilon - odd)) + odd)
+        needed = h * abs(gain) * most
+        share = min(max(away / needed, -1.0), 1.0) if needed > 0.0 else 0.0
+        put(signals, U, i, -most * share if gain > 0.0 else most * share)
+        put(own, INTEGRAL, i, integral)
 
 
 class SlidingModeController(Feedback):
@@ -42,6 +69,10 @@ class SlidingModeController(Feedback):
 
     S is tanh with a slope (Remark 7). The integral is the law's state: it grows by ``dt tanh(s_k)`` after u_k is taken.
 
+    ``scheme="implicit"`` takes the exact sgn at the period's end instead, on the model. With a = ds/dt without force,
+    b = ds/du a second and sigma = s + dt a + lam I it is ``u = -Z0 sgn(b) sat((sigma - n epsilon) / (dt |b| Z0))``,
+    where n epsilon is the nearest multiple that attracts: of even n where b < 0, of odd n where b > 0.
+
     Args:
         k: (k1, k2, k3, k4), positive, shape (4,); or (n, 4), one a slot. Not printed in the article.
         dt: control period in s.
@@ -50,12 +81,12 @@ class SlidingModeController(Feedback):
         lam: weight of the integral (Table 6).
         epsilon: period of the switching function (Table 6).
         wrap: take the error of the angle within half a turn; the article's scenarios do without.
+        scheme: "explicit" as in the article, or "implicit", which has no use for the slope.
+        model: of the plant, for the implicit scheme; Table 2's by default.
 
     Raises:
-        ValueError: a gain is not positive or has a wrong shape.
+        ValueError: a gain is not positive or has a wrong shape, or the scheme is another one.
     """
-
-    memory: ClassVar[int] = 1
 
     def __init__(
         self,
@@ -66,6 +97,8 @@ class SlidingModeController(Feedback):
         lam: float = SMC_GAINS["lam"],
         epsilon: float = SMC_GAINS["epsilon"],
         wrap: bool = True,
+        scheme: str = "explicit",
+        model: CartPendulum | None = None,
     ) -> None:
         shape = shape_of(k)
         if shape is None or shape[-1:] != (4,) or len(shape) > 2:
@@ -84,8 +117,14 @@ class SlidingModeController(Feedback):
         self.lam = number("lam", lam, above=0.0)
         self.epsilon = number("epsilon", epsilon, above=0.0)
         self.wrap = switch("wrap", wrap)
+        self.scheme, self.model = choice("scheme", scheme, SCHEMES), nominal(model)
         for gains in (self.k, self.slope):
             gains.flags.writeable = False
+
+    @property
+    def memory(self) -> int:
+        """The integral."""
+        return 1
 
     def part(self, n: int) -> Part:
         """What the law puts into a loop of n slots.
@@ -96,8 +135,10 @@ class SlidingModeController(Feedback):
         k, slope = np.atleast_2d(self.k), np.atleast_1d(np.minimum(self.slope, 1e300))  # as good as sgn
         if len(k) not in (1, n):
             raise ValueError(f"k has {len(k)} slots, the observation has {n}")
-        settings = (self.Z0, self.lam, math.pi / self.epsilon, self.dt, float(self.wrap))
-        return Part(columns(n, 0.0, k.T, slope[None], *settings), act=_act)
+        settings = (self.Z0, self.lam, self.epsilon, self.dt, float(self.wrap), self.model.as_array())
+        return Part(
+            columns(n, 0.0, k.T, slope[None], *settings), act=_explicit if self.scheme == "explicit" else _implicit
+        )
 
     def __repr__(self) -> str:
         settings = {name: getattr(self, name) for name in ("dt", "slope", "Z0", "lam", "epsilon")}

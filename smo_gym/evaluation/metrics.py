@@ -40,6 +40,7 @@ class Meter:
         finish: from its rows (rows, n) and the control period in s to one row a metric, (metrics, n).
         sample: block that is called at every sampling instant.
         close: block that is called when a control period ends. Both must leave runs alone whose row ALIVE is 0.
+        settings: further rows behind these, alike in all slots.
 
     At a sampling instant a meter may read positions and their references, rows X, X + 1, XD and XD + 1, and the force;
     at the end of a control period the whole state, the estimate, the force and the reward. Where an agent is asked once
@@ -52,10 +53,11 @@ class Meter:
     finish: Callable[[Array, float], Array]
     sample: Block | None = None
     close: Block | None = None
+    settings: tuple[float, ...] = ()
 
     def part(self, n: int) -> Part:
         """What the meter puts into a loop of n slots."""
-        return Part(columns(n, np.zeros(self.rows)), sample=self.sample, close=self.close)
+        return Part(columns(n, np.zeros(self.rows), *self.settings), sample=self.sample, close=self.close)
 
 
 (

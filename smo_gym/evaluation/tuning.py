@@ -1,4 +1,4 @@
-"""One tuner for all: CMA-ES over the logarithms of an observer's numbers, with the same budget for each."""
+"""One tuner for all: CMA-ES over the logarithms of an observer's or a law's numbers, with the same budget for each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SPREAD = 0.7
 RANGE = 1000.0
 """Numbers stay within this factor of where they begin: one that runs away, as a filter's cutoff may, ends there."""
 LOST = 1e6
-"""Cost of settings that an observer refuses, or with which its estimate is not finite: less than that is better."""
+"""Cost of settings that are refused, or with which nothing finite comes about: less than that is better."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ def tune(
     seed: int,
     told: Callable[[int], object] = lambda evaluations: None,
 ) -> Tuned:
-    """The tree of positive numbers with the least cost that ``budget`` evaluations find.
+    """The tree of numbers with the least cost that ``budget`` evaluations find; each keeps the sign it begins with.
 
     Args:
         cost: of a tree; a ``ValueError`` says that it is not allowed, which is never better than one that is.
@@ -49,19 +49,22 @@ def tune(
         told: called with the number of evaluations done since the last call.
 
     Raises:
-        ValueError: a number of ``start`` is not positive, or nothing that was tried is allowed.
+        ValueError: a number of ``start`` is 0 or not finite, or nothing that was tried is allowed.
         ImportError: the package cma is missing.
     """
     try:
         import cma
     except ImportError:
         raise ImportError('tuning needs cma: pip install "smo_gym[reference]"') from None
-    begin = np.log([number(place, value, above=0.0) for place, value in leaves(start)])
+    given = [number(place, value) for place, value in leaves(start)]
+    if zeros := [place for (place, _), value in zip(leaves(start), given, strict=True) if value == 0.0]:
+        raise ValueError(f"{zeros[0]}=0 must be another number: it is varied by factors")
+    begin, signs = np.log(np.abs(given)), np.sign(given)
     whole("budget", budget, 1)
 
     def tried(point: Array) -> float:
         try:
-            found = cost(with_leaves(start, iter(np.exp(point).tolist())))
+            found = cost(with_leaves(start, iter((signs * np.exp(point)).tolist())))
         except (ValueError, OverflowError):
             return LOST
         return found if math.isfinite(found) and found < LOST else LOST
@@ -86,10 +89,10 @@ def tune(
         if costs[i] < least:
             best, least = points[i][: len(begin)], costs[i]
     if least >= LOST:
-        raise ValueError(f"none of {done} settings tried keeps a finite estimate: begin elsewhere than {start!r}")
-    return Tuned(with_leaves(start, iter(_short(best))), least, first, done)
+        raise ValueError(f"none of {done} settings tried gives finite numbers: begin elsewhere than {start!r}")
+    return Tuned(with_leaves(start, iter(_short(signs * np.exp(best)))), least, first, done)
 
 
 def _short(point: Array) -> list[float]:
     """To four digits: more is not known."""
-    return [float(f"{value:.4g}") for value in np.exp(point)]
+    return [float(f"{value:.4g}") for value in point]

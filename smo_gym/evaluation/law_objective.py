@@ -1,0 +1,47 @@
+"""What tuning a law minimises: the mean squares of both positions and a little of the force's variation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+from .candidates import Tree
+from .law_cases import MEASURED, ZERO, Estimate, Place, run
+from .law_settings import Laws
+
+TRAINING: dict[str, Place] = {
+    "regulation-printed": Place("table-4", Estimate("printed", ZERO), "exact", 0.02),
+    "regulation-filtered": Place("table-4", Estimate("ekf", MEASURED), "noise", 0.02),
+    "upright-filtered": Place("upright", Estimate("ekf", MEASURED), "noise", 0.02, disturbed=True),
+    "tracking-printed": Place("tracking", Estimate("printed", ZERO), "exact", 0.001),
+    "tracking-filtered": Place("tracking", Estimate("ekf", MEASURED), "noise", 0.02),
+}
+"""Where the laws of each family are tuned."""
+SEED = 20_000
+"""Of the training plants."""
+FALL = 20.0
+"""Cost of a run that fails, beside about 2 of a good one."""
+_VARIATION = 100.0
+
+
+def of_law(laws: Laws, name: str, family: str) -> Callable[[Tree], float]:
+    """The objective of a law in a family, of its numbers.
+
+    ``mse_h / a + mse_theta / b + w ln(TV / 100 N) + 20 (share of runs that fail)``, means over training plants that did
+    not fail, with the family's scales (a, b) and the settings' w.
+    """
+    place = TRAINING[family]
+    place = replace(place, estimate=laws[name].estimate or place.estimate, period=laws[name].period or place.period)
+    scales = laws.scales[family]
+
+    def cost(tuned: Tree) -> float:
+        found = run(place, laws.of(name, family, tuned), laws.runs, SEED)
+        stood = found["failed"] == 0.0
+        if not stood.any():
+            return 10.0 * FALL
+        h, theta, variation = (float(found[key][stood].mean()) for key in ("mse_h", "mse_theta", "total_variation"))
+        smooth = laws.smoothness * math.log(max(variation, 1e-9) / _VARIATION)
+        return h / scales[0] + theta / scales[1] + smooth + FALL * float(1.0 - stood.mean())
+
+    return cost
