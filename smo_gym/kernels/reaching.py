@@ -38,23 +38,25 @@ def twisting_explicit(sigma: float, z: float, h: float, k_1: float, k_2: float) 
 
 @inlined
 def twisting_implicit(sigma: float, z: float, h: float, k_1: float, k_2: float) -> tuple[float, float]:
-    """The same with the sliding variable at the step's end, ``sigma+ = sigma + h v``, on the right-hand side.
+    """The same, implicit in what is not known: see :class:`~smo_gym.controllers.reaching.Reaching`.
 
-    ``|sigma + h z| = |sigma+| + h k_1 sqrt|sigma+| + h^2 k_2 |xi|`` with xi in Sgn sigma+.
+    ``|sigma| = s^2 + h k_1 s + h^2 k_2 |xi|`` with xi in Sgn sigma.
     """
-    b, least = sigma + h * z, h * h * k_2
-    z -= h * k_2 * clipped(b / least)
-    rest = max(abs(b) - least, 0.0)
+    least = h * h * k_2
+    push = h * k_2 * clipped(sigma / least)
+    rest = max(abs(sigma) - least, 0.0)
     root = 0.5 * (math.sqrt(h * h * k_1 * k_1 + 4.0 * rest) - h * k_1)
-    return -k_1 * root * sign(b) + z, z
+    z -= push
+    return -k_1 * root * sign(sigma) + z - push, z
 
 
 @inlined
 def proportional_integral(sigma: float, z: float, h: float, k_1: float, k_2: float) -> tuple[float, float]:
-    """``v = -k_1 sigma + z``, ``z' = -k_2 sigma``, implicit like the others."""
-    ahead = (sigma + h * z) / (1.0 + h * k_1 + h * h * k_2)
-    z -= h * k_2 * ahead
-    return -k_1 * ahead + z, z
+    """``v = -k_1 sigma + z``, ``z' = -k_2 sigma``, in the same way."""
+    after = sigma / (1.0 + h * k_1 + h * h * k_2)
+    push = h * k_2 * after
+    z -= push
+    return -k_1 * after + z - push, z
 
 
 @inlined

@@ -30,14 +30,16 @@ def front(points: Sequence[tuple[float, float]]) -> list[bool]:
     ]
 
 
-def neighbours(points: Mapping[str, tuple[float, float]], names: Sequence[str]) -> list[list[str]]:
-    """Names of points that are so near on logarithmic axes that one label tells of them."""
+def neighbours(
+    points: Mapping[str, tuple[float, float]], names: Sequence[str], near: tuple[float, float] = NEAR
+) -> list[list[str]]:
+    """Names of points that are within factors on logarithmic axes, so that one label tells of them."""
     found: list[list[str]] = []
     for name in sorted(names, key=lambda name: points[name][1]):
         x, y = points[name]
         for group in found:
             a, b = points[group[0]]
-            if max(a / x, x / a) < NEAR[0] and y / b < NEAR[1]:
+            if max(a / x, x / a) < near[0] and y / b < near[1]:
                 group.append(name)
                 break
         else:
