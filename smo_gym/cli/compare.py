@@ -1,4 +1,4 @@
-"""The RL table: learned policies, LQR and SMC, each on what it is allowed to know, on the same plants.
+"""The RL table: learned policies and laws, each on what it is allowed to know, on the same plants.
 
     smo-gym compare runs
 
@@ -68,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     place = scenario.load(args.config).changed(force_limit=args.force_limit, note="command line")
     contenders, left_out = contest.trained(args.folders, place.environment)
-    contenders += contest.designed(place)
+    contenders += contest.designed(place) + contest.rivals()
     place = contest.entered(place, contenders)
     groups = [group for contender in contenders for group in contest.groups(place, contender, args.runs)]
     with files.claimed(args.out, RESULTS) as out, computing.computing(args, out) as measure:
@@ -94,8 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
             f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. "
             "Over all levels: the mean of the levels' interquartile means, whose ratio the answers below are about. "
-            f"LQR and SMC act every {place.control_period.value:g} s, policies as in their training. A failed run "
-            "counts as the worst.\n"
+            f"LQR and SMC act every {place.control_period.value:g} s, policies as in their training, and the tuned laws "
+            "like these, on whose box, plants and reward they were tuned. A failed run counts as the worst.\n"
         )
         texts = (
             contest_table.aggregate_csv(rows, levels),

@@ -11,18 +11,19 @@ import gymnasium
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from .. import files
 from ..envs.task import Task
 from ..kernels.blocks import ALIVE, XD, U, X, at, block, offsets, put
 from ..observers import ExtendedKalmanFilter, Observer, Oracle, SlidingModeObserver, SteadyKalman
 from ..plant import CartPendulum
 from ..typing import Array
 from ..wrappers import VectorObserverWrapper
-from . import metrics, scenario
+from . import configs, metrics, scenario
 from .draws import deviations, noise
 from .metrics import Meter, Metric, add
 from .rollout import rollout
 
-REGULATION, UPRIGHT, TRACKING = "regulation", "upright", "tracking"
+REGULATION, UPRIGHT, TRACKING, LEARNING = "regulation", "upright", "tracking", "learning"
 LIMIT = 30.0
 """Of the force in N: chosen, as in the observers' table."""
 LEVEL = 0.2
@@ -74,11 +75,13 @@ class Case:
 
 @cache
 def cases() -> dict[str, Case]:
-    """By name: Table 4's start, Table 5's first, the truly inverted plant, Table 7's reference."""
+    """By name: Table 4's start, Table 5's first, the truly inverted plant, Table 7's reference; and where PPO learns."""
     four, five, upright, seven = map(scenario.named, ("regulation", "initial-conditions", "upright", "tracking"))
     hanging = (("angle_limit", np.pi), ("track_limit", 50.0))
     start, first, on_it = four.initial_states.value[""], five.initial_states.value["1"], seven.initial_states.value[""]
     lean = (0.0, 0.3, 0.0, 0.0)
+    box = files.read_yaml(configs.path("ppo"))["SMOPendulum-v0"]["env_kwargs"]
+    low, high = map(tuple, box["initial_state"])
     found = (
         Case("table-4", four.environment, start, start, four.horizon.value, REGULATION, hanging),
         Case("table-5-1", five.environment, first, first, five.horizon.value, REGULATION, hanging),
@@ -90,6 +93,7 @@ def cases() -> dict[str, Case]:
             *("tracking", seven.environment, on_it, on_it, seven.horizon.value, TRACKING),
             (*hanging, ("reference", seven.trajectory()), ("preview", 0)),
         ),
+        Case("learning", four.environment, low, high, box["horizon"], LEARNING, hanging),
     )
     return {case.name: case for case in found}
 
@@ -117,6 +121,10 @@ class Estimate:
         noisy: Any = {"noise": SENSORS["noise"]["noise"]}
         if self.observer == "printed":
             return SlidingModeObserver(gains="smc", slopes=(12.5, 12.5), **measured)
+        if self.observer in ("smo", "smo-uncompensated"):
+            return SlidingModeObserver(
+                gains="lqr", slopes=(12.5, 12.5), compensation=self.observer == "smo", **measured
+            )
         if self.observer == "constant":
             gains = {"m1": (2.0, 2.0), "beta_1": (3.0, 10.0), "beta_2": (0.0, 0.0)}
             return SlidingModeObserver(gains=gains, slopes=(12.5, 12.5), **measured)
@@ -155,6 +163,8 @@ class Place:
     def family(self) -> str:
         """Which of a law's gains are meant for it, case and estimate; upright those of the filter serve all."""
         family = cases()[self.case].family
+        if family == LEARNING:
+            return f"{family}-{self.estimate.observer}"
         return f"{family}-{'filtered' if family == UPRIGHT else self.estimate.family}"
 
     def options(self) -> dict[str, Any]:

@@ -16,8 +16,12 @@ TRAINING: dict[str, Place] = {
     "upright-filtered": Place("upright", Estimate("ekf", MEASURED), "noise", 0.02, disturbed=True),
     "tracking-printed": Place("tracking", Estimate("printed", ZERO), "exact", 0.001),
     "tracking-filtered": Place("tracking", Estimate("ekf", MEASURED), "noise", 0.02),
+    **{
+        f"learning-{kind}": Place("learning", Estimate(kind, start), "exact", 0.02)
+        for kind, start in (("smo", ZERO), ("smo-uncompensated", ZERO), ("state", MEASURED))
+    },
 }
-"""Where the laws of each family are tuned."""
+"""Where the laws of each family are tuned; of "learning" where PPO learns, on what it is told."""
 SEED = 20_000
 """Of the training plants."""
 FALL = 20.0
@@ -33,15 +37,16 @@ def of_law(laws: Laws, name: str, family: str) -> Callable[[Tree], float]:
     """
     place = TRAINING[family]
     place = replace(place, estimate=laws[name].estimate or place.estimate, period=laws[name].period or place.period)
-    scales = laws.scales[family]
+    settings = laws.families[family]
+    (a, b), weight = settings.scales, settings.smoothness
 
     def cost(tuned: Tree) -> float:
-        found = run(place, laws.of(name, family, tuned), laws.runs, SEED)
+        found = run(place, laws.of(name, family, tuned), settings.runs, SEED)
         stood = found["failed"] == 0.0
         if not stood.any():
             return 10.0 * FALL
         h, theta, variation = (float(found[key][stood].mean()) for key in ("mse_h", "mse_theta", "total_variation"))
-        smooth = laws.smoothness * math.log(max(variation, 1e-9) / _VARIATION)
-        return h / scales[0] + theta / scales[1] + smooth + FALL * float(1.0 - stood.mean())
+        smooth = weight * math.log(max(variation, 1e-9) / _VARIATION)
+        return h / a + theta / b + smooth + FALL * float(1.0 - stood.mean())
 
     return cost

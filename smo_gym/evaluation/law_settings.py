@@ -79,6 +79,17 @@ class LawCandidate(Strict):
         return choice("law", name, LAWS)
 
 
+class Family(Strict):
+    """Cases that a law has gains of its own for, and what tuning minimises there."""
+
+    scales: tuple[float, float]
+    """Mean squares of h in m^2 and of theta in rad^2 that count as 1."""
+    smoothness: float = 0.1
+    """Weight of the logarithm of the total variation."""
+    runs: Annotated[int, Field(ge=1)] = 16
+    """Training plants, which no table has."""
+
+
 class Laws(Strict):
     """Laws that were tuned alike."""
 
@@ -87,12 +98,7 @@ class Laws(Strict):
     """Of CMA-ES."""
     budget: Annotated[int, Field(ge=1)]
     """Evaluations that each law gets in each family."""
-    runs: Annotated[int, Field(ge=1)]
-    """Training plants, which no table has."""
-    smoothness: float
-    """Weight of the logarithm of the total variation in the objective."""
-    scales: dict[str, tuple[float, float]]
-    """Mean squares of h in m^2 and of theta in rad^2 that count as 1, by family."""
+    families: dict[str, Family]
     laws: dict[str, LawCandidate]
 
     def __getitem__(self, name: str) -> LawCandidate:

@@ -16,6 +16,7 @@ from ..evaluation.guard import DIVERGED
 from ..evaluation.scenario import Scenario
 from ..policies.frozen import Card, MlpPolicy
 from ..typing import Array, Flags
+from .rivals import RIVALS, TITLES
 
 ALGORITHMS = {"ppo": "PPO", "recurrent": "RecurrentPPO"}
 ARM_OF = {"smo": WITH, "smo-uncompensated": WITHOUT, "state": ORACLE}
@@ -99,6 +100,14 @@ def _alike(path: Path, card: Card, seeds: dict[int, tuple[str, Card]]) -> None:
 def designed(scenario: Scenario) -> list[Contender]:
     """The scenario's own controllers on each kind of estimate."""
     return [Contender(name.upper(), kind, (name,)) for name in scenario.controllers for kind in ARM_OF]
+
+
+def rivals() -> list[Contender]:
+    """Laws that were tuned for what the policies are rewarded for."""
+    return [
+        Contender(TITLES[rival.law], rival.observation, (f"{rival.__module__}:{rival.__qualname__}",))
+        for rival in RIVALS
+    ]
 
 
 def entered(scenario: Scenario, contenders: Iterable[Contender]) -> Scenario:

@@ -14,6 +14,7 @@ from ..evaluation.report.tables import exact
 from ..wrappers.view import KINDS
 from .bootstrap import Comparison, Estimate
 from .contest import Scores
+from .rivals import TITLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +82,7 @@ def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores
     on_estimates = [scores for scores in learned if scores.contender.observation == "smo"]
     on_positions = [scores for scores in learned if scores.contender.observation in ("positions", "stacked")]
     laws = [known[title] for title in ("LQR on smo", "SMC on smo") if title in known]
+    tuned = [scores for scores in all_scores if scores.contender.controller in TITLES.values()]
     return [
         (
             "Does a policy that learns on SMO estimates beat one that learns on positions?",
@@ -89,6 +91,10 @@ def questions(all_scores: Sequence[Scores]) -> list[tuple[str, list[tuple[Scores
         (
             "Does either beat LQR and SMC on SMO estimates?",
             [(a, b) for a in on_estimates + on_positions for b in laws],
+        ),
+        (
+            "Does a policy beat a law that was tuned for the same reward, on the same observation?",
+            [(a, b) for a in learned for b in tuned if a.contender.observation == b.contender.observation],
         ),
     ]
 

@@ -32,7 +32,7 @@ PERIOD = 0.02
 
 
 def made(environment="SMOPendulum-v0", n=3, **options):
-    given = {"control_period": PERIOD, "horizon": 10.0, "track_limit": 50.0, **options}
+    given = {"control_period": PERIOD, "horizon": 10.0, "track_limit": 50.0, "uncertainty": 0.0, **options}
     env = gymnasium.make_vec(environment, n, autoreset_mode=AutoresetMode.DISABLED, **given)
     return VectorObserverWrapper(env, Oracle())
 
@@ -126,7 +126,7 @@ def test_a_matched_disturbance_is_as_if_it_were_not_there(reaching):
 def test_masses_are_matched_and_the_rods_length_is_not():
     """With other masses the law still makes the nominal run; with another rod it does not."""
     law = IntegralSlidingMode(Linear(K, 0.001), 0.001, Reaching.super_twisting(40.0))
-    free = metrics(Linear(K, 0.001), control_period=0.001, n=1)["mse_theta"]
+    free = metrics(Linear(K, 0.001), control_period=0.001, n=1)["mse_theta"].item()
     heavy, long = (CartPendulum(cart_mass=4.2, bob_mass=0.38), CartPendulum(rod_length=0.52))
     of = {plant: metrics(law, control_period=0.001, n=1, plants=[plant])["mse_theta"] for plant in (heavy, long)}
     assert of[heavy] == pytest.approx(free, rel=1e-2)
