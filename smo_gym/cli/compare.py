@@ -94,8 +94,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "Interquartile means of MSE of h (m^2) + MSE of theta (rad^2) with 95 % bootstrap intervals over training "
             f"seeds and plants: {args.runs} plants a level, the same for all, forces within {args.force_limit:g} N. "
             "Over all levels: the mean of the levels' interquartile means, whose ratio the answers below are about. "
-            f"LQR and SMC act every {place.control_period.value:g} s, policies as in their training, and the tuned laws "
-            "like these, on whose box, plants and reward they were tuned. A failed run counts as the worst.\n"
+            f"LQR and SMC act every {place.control_period.value:g} s, policies as in their training, tuned laws like "
+            "these, on whose box, plants and reward they were tuned. A failed run counts as the worst.\n"
         )
         texts = (
             contest_table.aggregate_csv(rows, levels),

@@ -17,7 +17,7 @@ from tqdm import tqdm
 
 from .. import files
 from ..evaluation import formats, law_settings
-from ..evaluation.law_cases import ESTIMATES, PERIODS, SENSORS, cases
+from ..evaluation.law_cases import ESTIMATES, LEARNING, PERIODS, SENSORS, cases
 from ..evaluation.law_settings import Laws
 from ..evaluation.law_table import Cell, Row, cells, measured, row
 from ..evaluation.report import figures, law_panels
@@ -35,7 +35,10 @@ FIGURE = "laws"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     parser = Parser("laws", __doc__)
-    observers, places = list(dict.fromkeys(each.observer for each in ESTIMATES)), [*cases()]
+    observers, places = (
+        list(dict.fromkeys(each.observer for each in ESTIMATES)),
+        [name for name, case in cases().items() if case.family != LEARNING],
+    )
     parser.add_argument("--law", default=None, metavar="NAME", help="some of them (default: all)", **several(str))
     for name, known, default in (
         ("observer", observers, observers),

@@ -49,8 +49,8 @@ class Reaching:
       ``|d'| / k2``.
 
     Explicit steps are Euler's. Implicit ones take sgn at the step's end, where the set-valued sgn is a projection: no
-    gain makes them chatter. How: D, the integral of d, is what sigma would be without v, and v takes off what D will be a
-    step ahead. Super-twisting is Levant's differentiator of D: by an implicit step of h (Acary and Brogliato 2010) it
+    gain makes them chatter. How: D, the integral of d, is what sigma would be without v, and v takes off what D will be
+    a step ahead. Super-twisting is Levant's differentiator of D: by an implicit step of h (Acary and Brogliato 2010) it
     predicts D to the order of h^2, and once it has converged ``sigma_{k+1} = h (d_k - d_{k-1})``. (The implicit step of
     Brogliato, Polyakov and Efimov, IEEE Trans. Automatic Control 65, 2020, lets sigma + h v vanish without a
     prediction of d, and leaves ``h d_k``.) ``sign`` and ``layer`` have no integral that could predict.

@@ -75,7 +75,7 @@ class Case:
 
 @cache
 def cases() -> dict[str, Case]:
-    """By name: Table 4's start, Table 5's first, the truly inverted plant, Table 7's reference; and where PPO learns."""
+    """By name: Table 4's start, Table 5's first, the truly inverted plant, Table 7's reference, and PPO's box."""
     four, five, upright, seven = map(scenario.named, ("regulation", "initial-conditions", "upright", "tracking"))
     hanging = (("angle_limit", np.pi), ("track_limit", 50.0))
     start, first, on_it = four.initial_states.value[""], five.initial_states.value["1"], seven.initial_states.value[""]

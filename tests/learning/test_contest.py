@@ -74,7 +74,7 @@ def test_the_table_is_made_of_runs_of_the_harness(tmp_path, short, capsys):
     assert {place[2]: row["row"] for place, row in rows.items()} == {"0.1": "level", "0.2": "level", "": "all"}
     with (out / "runs.csv").open(newline="") as file:
         runs = list(csv.DictReader(file))
-    assert len(rows) == 3 * (3 + 6)
+    assert len(rows) == 3 * (3 + 6 + 6)
     # the policy is the LQR, so its runs are the LQR's, and the LQR's are those of agents/evaluate.py
     place = scenario.load(short).changed(force_limit=30.0)
     (group,) = (g for g in study.groups([place], ["lqr"], ["with"], 3) if g.uncertainty == 0.2)
