@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..models import Model
@@ -56,10 +56,14 @@ class Rig:
     parts: Mapping[str, tuple[int, ...]]
     """Which of the model's numbers grow with the motor's gain and with the inverse of the pendulum's length."""
 
+    def of(self, params: Sequence[float]) -> Rig:
+        """The rig with other numbers of its model."""
+        return replace(self, model=replace(self.model, params=tuple(params)))
+
     def mistaken(self, **factors: float) -> Model:
         """The model with a motor gain, or an inverse length, that is wrong by some factors."""
         numbers = list(self.model.params)
         for part, factor in factors.items():
             for index in self.parts[part]:
                 numbers[index] *= factor
-        return replace(self.model, params=tuple(numbers))
+        return self.of(numbers).model
