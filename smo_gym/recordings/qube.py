@@ -4,6 +4,8 @@ All numbers are identified, by the likelihood of an EKF's innovations on six tra
 voltage gain, gravity and coupling trade off against each other: the model predicts, its parameters say little.
 """
 
+import math
+
 import numpy as np
 
 from ..kernels import inlined
@@ -52,6 +54,8 @@ QUBE = Rig(
         ("arm", "pendulum"),
     ),
     period=0.002,
+    numbers=("a", "k", "b", "c", "o", "g", "d", "e", "r", "u0", "n", "i"),
+    quanta=(2.0 * math.pi / 2048.0, 2.0 * math.pi / 2048.0),
     noise=(7.481e-04, 7.481e-04),
     acceleration=(0.543, 0.648),
     columns=("t", "theta", "alpha", "plant_input"),

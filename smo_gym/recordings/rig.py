@@ -35,8 +35,12 @@ class Rig:
     model: Model
     period: float
     """Sampling period in s."""
+    numbers: tuple[str, ...]
+    """Names of the model's numbers, as its equations have them."""
+    quanta: tuple[float, float]
+    """Steps of the measured positions."""
     noise: tuple[float, float]
-    """Standard deviations of the positions."""
+    """Standard deviations of the positions, quantisation included."""
     acceleration: tuple[float, float]
     """Process noise: accelerations per root Hz, the first along the input."""
     columns: tuple[str, str, str, str]
