@@ -1,7 +1,8 @@
 """A cart on a belt with a pole on a potentiometer (SensorsINI/CartPoleSimulation), the article's own kind of plant.
 
-All numbers are identified, in a study beside this package: model and noise by the likelihood of an EKF's innovations on
-60 training runs, the potentiometer's scale by the same, its gap read off the recordings.
+All numbers are identified: model and noise by the likelihood of an EKF's innovations on 60 training runs, which
+:func:`.fitting.fit` finds again; the potentiometer's scale by the same, its gap read off the recordings. The noise of
+the cart's position is that of its steps alone: free, it goes to 0.
 """
 
 import math
@@ -64,6 +65,6 @@ CART_POLE = Rig(
     unscored=(25, 12),
     lost=0.5,
     window=(7, 4),
-    jerk=(1500.0, 150.0),
+    jerk=(1500.0, 150.0),  # chosen: on twins it is 0.0093 m/s and 0.059 rad/s from the truth
     parts={"gain": (4,), "inverse_length": (0, 1)},
 )
