@@ -81,8 +81,8 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
         "--observer",
         default=SMO,
         metavar="NAME",
-        help="smo (default), theorem (gains designed for it), oracle (the true state), an arm that an imported module "
-        "registers, or all",
+        help="smo (default), theorem (gains designed for it), oracle (the true state), one that was tuned (smo-gym "
+        "observers), an arm that an imported module registers, or all",
     )
     add(
         "--compensation",

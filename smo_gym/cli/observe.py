@@ -1,8 +1,8 @@
 """Estimate the velocities of a plant of your own from logged positions and inputs.
 
     smo-gym observe FILE.csv --observer ekf --model cart-pendulum
-    smo-gym observe FILE.csv --observer smo --model '{cart_mass: 0.57, bob_mass: 0.23, rod_length: 0.33, gravity: 9.81}'
-    smo-gym observe FILE.csv --observer ukf --model my_plant:MODEL --positions arm alpha --input volts
+    smo-gym observe FILE.csv --observer ukf --model '{rod_length: 0.33, gravity: 9.81}'
+    smo-gym observe FILE.csv --model my_plant:MODEL --positions arm alpha --input volts
 
 Writes the estimates beside time and positions, and a picture of them.
 """
@@ -38,8 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Estimate; 0 when all went well, 2 for a bad argument or file."""
     parser = Parser("observe", __doc__)
     parser.add_argument("file", type=Path, metavar="FILE.csv", help="with a header; # begins a comment")
-    parser.add_argument("--observer", default="ekf", metavar="NAME", help="tuned settings of that name (default: ekf)")
-    parser.add_argument("--tuned", default="simulated", metavar="WHERE", help="or FILE.yaml (default: simulated)")
+    parser.add_argument("--observer", default="ekf", metavar="NAME", help="one of those that were tuned (default: ekf)")
+    parser.add_argument(
+        "--tuned",
+        default="simulated",
+        metavar="WHERE",
+        help="simulated, cartpole, qube or FILE.yaml (default: simulated)",
+    )
     parser.add_argument("--set", type=_mapping, default={}, metavar="YAML", help="settings of the observer, over those")
     parser.add_argument(
         "--model", default=PLANT, metavar="MODEL", help=f"{PLANT}, {', '.join(RIGS)}, fields as YAML, or module:NAME"

@@ -1,7 +1,7 @@
 """All observers, tuned alike: on simulated encoders, or on recordings of real ones.
 
-    smo-gym observers                        # sensors x levels of uncertainty, on the same trajectories and in the loop
-    smo-gym observers --data DIR --out OUT   # recordings of two real rigs, and how well each velocity is estimated
+    smo-gym observers                        # sensors and levels, on the same trajectories and in the loop
+    smo-gym observers --data DIR --out OUT   # recordings of two real rigs
 
 Prints, and writes to --out, the errors of both velocities, with 95 % intervals over runs.
 """

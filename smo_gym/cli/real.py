@@ -18,7 +18,8 @@ from ..evaluation.real_sweeps import Lost, Mistaken
 from ..evaluation.report import fault_panels, figures
 from ..evaluation.store import digest, kept
 from ..observers import SlidingModeObserver
-from ..recordings import RIGS, Rig, load, smoothing
+from ..recordings import CART_POLE, RIGS, load, smoothing
+from ..recordings.loading import holds
 from .entry import Stop
 
 RESULTS = ("real.csv", "lost.csv", "mismatch.csv", "real.md")
@@ -28,7 +29,7 @@ SMO = "smo"
 
 def measure(args: argparse.Namespace) -> int:
     """Measure all rigs of a folder; 0 when all went well."""
-    found = {rig.name: load(rig, args.data, "test") for rig in RIGS.values() if _is_there(rig, args)}
+    found = {rig.name: load(rig, args.data, "test") for rig in RIGS.values() if holds(rig, args.data)}
     if not found:
         raise ValueError(f"--data {args.data}: has no folder of {' or '.join(RIGS)}, and no *.csv")
     drawings = [f"{FIGURE}.{form}" for form in figures.FORMATS] if args.figure else []
@@ -44,11 +45,11 @@ def measure(args: argparse.Namespace) -> int:
                 runs = Runs.of(RIGS[name], recordings)
                 with tqdm(total=len(observers), unit="observer", desc=name, leave=False, disable=None) as bar:
                     rows += on_recordings.rows(runs, observers, bar.update)
-                if SMO in observers and RIGS[name].name == "cartpole":
+                if SMO in observers and name == CART_POLE.name:
                     smo = settings[SMO].build(RIGS[name].model)
                     assert isinstance(smo, SlidingModeObserver)
                     lost += real_sweeps.lost(runs, smo)
-                if args.mismatch and RIGS[name].name == "cartpole":
+                if args.mismatch and name == CART_POLE.name:
                     mistaken += _mistaken(args, settings, [*observers], runs, store)
                 if args.figure and figure is None and any(each.fault.any() for each in recordings):
                     figure = fault_panels.draw(runs, observers)
@@ -68,17 +69,6 @@ def measure(args: argparse.Namespace) -> int:
             print("\n\n".join([_table(rig, rows, "simple") for rig in found] + _sweeps(lost, mistaken, "simple")))
     print(f"\nresults are in {args.out}")
     return 0
-
-
-def _is_there(rig: Rig, args: argparse.Namespace) -> bool:
-    """Whether the folder has recordings of a rig: its own folder, or files of its columns."""
-    if (args.data / rig.name).is_dir():
-        return True
-    if any((args.data / other).is_dir() for other in RIGS):
-        return False
-    return any(
-        rig.columns[3] in path.read_text(encoding="utf-8-sig")[:2000] for path in sorted(args.data.glob("*.csv"))[:1]
-    )
 
 
 def _mistaken(

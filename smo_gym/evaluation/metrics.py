@@ -6,7 +6,8 @@ others, whose metrics then stand in every table of runs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,6 +189,19 @@ def register(meter: Meter) -> None:
     if taken := {metric.name for metric in meter.metrics} & {*names()}:
         raise ValueError(f"metrics {', '.join(sorted(taken))} are measured already")
     METERS[meter.name] = meter
+
+
+@contextmanager
+def measuring(meters: Iterable[Meter]) -> Iterator[None]:
+    """While it lasts, these are measured, too."""
+    added = [meter for meter in meters if meter.name not in METERS]
+    for meter in added:
+        register(meter)
+    try:
+        yield
+    finally:
+        for meter in added:
+            del METERS[meter.name]
 
 
 def names() -> list[str]:

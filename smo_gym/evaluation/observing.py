@@ -19,17 +19,17 @@ from .scenario import Scenario
 from .store import Store, digest
 from .study import Group, Outcome
 
+EXACT, NOISE = "exact", "noise"
+"""The sensors that noise gains are measured with."""
 SENSORS: dict[str, Any] = {
-    "exact": {},
+    EXACT: {},
     "counts": "encoders",
-    "noise": {"noise": (2e-4, 1e-3)},
+    NOISE: {"noise": (2e-4, 1e-3)},
     "delay": {"resolution": (1e-4, 2.0 * np.pi / 4096), "delay": (5, 5)},
     "cart-pole": "cart-pole",
     "qube": "qube",
 }
 """The sensors of the table: presets, and some that are chosen."""
-NOISE = "noise"
-"""The sensor that noise gains are measured with."""
 LEVELS = (0.05, 0.1, 0.2)
 LAW = "lqr"
 HORIZON, FORCE, PERIOD = 10.0, 30.0, 0.001
@@ -122,8 +122,10 @@ def open_loop(
                 kept = store.read(key) if store else None
                 if kept is None:
                     seen = seen or simulated(sensor, level, runs, seed)
+                    if sensor == EXACT:
+                        exact = seen
                     if sensor == NOISE:
-                        exact = exact or simulated("exact", level, runs, seed)
+                        exact = exact or simulated(EXACT, level, runs, seed)
                     kept = _measured(candidate, seen, exact if sensor == NOISE else None)
                     if store:
                         store.write(key, kept)
@@ -202,7 +204,7 @@ def closed(sensor: str, outcome: Outcome) -> Iterator[Row]:
 
 def nanoseconds(candidate: Candidate, repetitions: int = 5) -> float:
     """Time in ns that an observer takes for a slot and sample, on one thread: the least of some."""
-    here = place("exact")
+    here = place(EXACT)
     task = here.task
     part = candidate.build().part(SIZE, PERIOD, FORCE, task.params)
     loop, alone = Loop(SIZE, 1, {"observer": part}), Loop(SIZE, 1, {})

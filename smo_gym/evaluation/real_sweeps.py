@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ..kernels.rk4 import rk4
 from ..models import Model
 from ..observers import Gains, SlidingModeObserver
 from ..recordings import scoring, smoothing
-from ..typing import Array
+from ..typing import Array, State
 from . import objectives
 from .candidates import Candidate, Candidates
 from .on_recordings import Runs
@@ -91,17 +92,14 @@ def drift_errors(runs: Runs) -> list[Array]:
         x, _, _ = smoothing.smoothed(runs.rig, recording)
         h = np.diff(recording.t)[:, None]
         ahead = np.array(
-            [_ahead(runs.rig.model, *each) for each in zip(x[:-1], recording.u[:-1], h[:, 0], strict=True)]
+            [_ahead(runs.rig.model, *each) for each in zip(x[:-1].tolist(), recording.u[:-1], h[:, 0], strict=True)]
         )
         found.append((x[1:, 2:] - ahead[:, 2:]) / h)
     return found
 
 
-def _ahead(model: Model, x: Array, u: float, h: float) -> Array:
-    a = model.rate(x, u)
-    b = model.rate(x + 0.5 * h * a, u)
-    c = model.rate(x + 0.5 * h * b, u)
-    return np.asarray(x + h / 6.0 * (a + 2.0 * (b + c) + model.rate(x + h * c, u)))
+def _ahead(model: Model, x: list[float], u: float, h: float) -> State:
+    return rk4(model.rhs, (x[0], x[1], x[2], x[3]), (u, *model.params), h)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -68,14 +68,9 @@ LATE = Meter(
 )
 
 
-@contextmanager
-def late_errors() -> Iterator[None]:
+def late_errors() -> AbstractContextManager[None]:
     """While it lasts, runs also measure the errors of the velocities once they have settled."""
-    metrics.register(LATE)
-    try:
-        yield
-    finally:
-        del metrics.METERS[LATE.name]
+    return metrics.measuring([LATE])
 
 
 @dataclass(frozen=True, slots=True)

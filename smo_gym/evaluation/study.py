@@ -19,6 +19,7 @@ from ..observers import Compiled, Observer
 from ..plant import STATE_NAMES
 from ..typing import Array, Flags
 from ..wrappers import VectorObserverWrapper
+from . import metrics
 from .arms import arm
 from .draws import deviations, noise
 from .pieces import Keeper, Map, cut
@@ -135,6 +136,8 @@ class Piece:
     """Options of the environment that its groups share."""
     seed: int
     samples: int | None
+    meters: tuple[metrics.Meter, ...]
+    """Ours that are measured; those of a user's modules come with these."""
 
 
 Found = tuple[tuple[int, ...], list[Outcome]]
@@ -188,7 +191,8 @@ def measure(
 
 def run_piece(piece: Piece, progress: Callable[[float], object] = lambda seconds: None) -> Found:
     """Run a piece of work of :func:`measure`."""
-    found = _run(piece.groups, piece.options, piece.seed, progress, piece.samples)
+    with metrics.measuring(piece.meters):
+        found = _run(piece.groups, piece.options, piece.seed, progress, piece.samples)
     return piece.indices, [replace(each, traces=each.traces.in_rows() if each.traces else None) for each in found]
 
 
@@ -196,6 +200,7 @@ def _pieces(wanted: Sequence[Group], done: Collection[int], seed: int, samples: 
     """What is left to do, cut as if nothing were done: pieces are the same ones, however often a study was stopped."""
     options = {id(group.scenario): group.scenario.environment_options for group in wanted}
 
+    meters = tuple(meter for meter in metrics.METERS.values() if meter.finish.__module__.startswith("smo_gym."))
     kinds = [
         (group.scenario.environment, repr(options[id(group.scenario)]), repr(group.settings), observer)
         for group, observer in zip(wanted, _observers(wanted), strict=True)
@@ -203,7 +208,7 @@ def _pieces(wanted: Sequence[Group], done: Collection[int], seed: int, samples: 
     for piece in cut(kinds, [group.runs for group in wanted]):
         if left := tuple(index for index in piece if index not in done):
             groups = tuple(wanted[index] for index in left)
-            yield Piece(left, groups, options[id(groups[0].scenario)], seed, samples)
+            yield Piece(left, groups, options[id(groups[0].scenario)], seed, samples, meters)
 
 
 def _observers(wanted: Iterable[Group]) -> list[Hashable]:

@@ -42,7 +42,7 @@ class BlockEstimator:
     """An observer's block at work on measurements that are handed in."""
 
     def __init__(self, parts: Sequence[Part], n: int) -> None:
-        self._n, self._parts = n, parts
+        self._n, self._parts, self._uneven = n, parts, False
         self._loop = Loop(n, 1, {"observer": parts})
         self._loop.start(slice(None), np.zeros((4, n)))
 
@@ -62,18 +62,20 @@ class BlockEstimator:
         Samples are evenly spaced as :meth:`~smo_gym.observers.protocol.Observer.start` was told, or ``elapsed`` seconds
         apart.
         """
-        if elapsed is not None:
+        if elapsed is not None or self._uneven:
             self._space(elapsed)
         self._loop.substeps = len(samples)
         self._loop.u[:] = u
         self._loop.run(recording=np.ascontiguousarray(samples))
 
-    def _space(self, elapsed: float) -> None:
+    def _space(self, elapsed: float | None) -> None:
+        """Tell the blocks the time since the sample before; None for what they began with."""
+        self._uneven = elapsed is not None
         own, start = self._loop.own("observer"), 0
         for part in self._parts:
             stop = start + part.rows.shape[1]
             if part.period is not None:
-                own[part.period, start:stop] = elapsed
+                own[part.period, start:stop] = part.rows[part.period] if elapsed is None else elapsed
             start = stop
 
 

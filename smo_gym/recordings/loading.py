@@ -49,6 +49,17 @@ def load(rig: Rig, folder: Path, split: str = "test", checked: bool = True) -> t
     return tuple(read(rig, path) for path in paths)
 
 
+def holds(rig: Rig, folder: Path) -> bool:
+    """Whether a folder has recordings of a rig: a folder of its name, or files with its columns."""
+    if (folder / rig.name).is_dir():
+        return True
+    first = next(iter(sorted(folder.glob("*.csv"))), None)
+    try:
+        return first is not None and {*rig.columns} <= {*logged.columns(first)}
+    except ValueError:
+        return False
+
+
 def read(rig: Rig, path: Path) -> Recording:
     """One recording.
 

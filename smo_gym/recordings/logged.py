@@ -48,9 +48,7 @@ def read(path: Path, positions: Sequence[str], given: str, time: str | None = No
         ValueError: the file cannot be read, has no such column, or a value that is no number, or an angle that looks
             like one in degrees.
     """
-    text = "".join(line for line in _text(path).splitlines(keepends=True) if not line.startswith("#"))
-    header, *lines = [row for row in csv.reader(io.StringIO(text)) if row] or [[]]
-    names = [name.strip() for name in header]
+    names, lines = _table(path)
     clock = time or next((name for name in TIME if name in names), TIME[0])
     wanted = [clock, *positions, given]
     for name in wanted:
@@ -67,6 +65,22 @@ def read(path: Path, positions: Sequence[str], given: str, time: str | None = No
     if degrees is None and (why := _looks_like_degrees(t, values[:, 2])):
         raise ValueError(f"{path}: {positions[1]} {why}: is it in degrees? (observe takes --degrees and --radians)")
     return Log(t, y, u)
+
+
+def columns(path: Path) -> list[str]:
+    """Names of a file's columns.
+
+    Raises:
+        ValueError: it cannot be read.
+    """
+    return _table(path)[0]
+
+
+def _table(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Names of the columns, and the lines below."""
+    text = "".join(line for line in _text(path).splitlines(keepends=True) if not line.startswith("#"))
+    header, *lines = [row for row in csv.reader(io.StringIO(text)) if row] or [[]]
+    return [name.strip() for name in header], lines
 
 
 def _number(path: Path, line: int, row: Sequence[str], place: int) -> float:

@@ -154,3 +154,17 @@ def test_a_tuned_observer_is_an_arm_of_the_harness(command, tmp_path):
     assert "steady-kalman" in (tmp_path / "runs.csv").read_text()
     done = command("evaluate", "--observer", "steady-kalmann", "--out", tmp_path, check=False)
     assert "'steady-kalman'" in done.stderr
+
+
+@pytest.mark.slow
+def test_processes_measure_the_same_table(command, tmp_path):
+    """Also what this command measures besides the usual."""
+    given = ("--observer", "levant-proper", "--sensor", "counts", "--runs", "2")
+    for workers in (1, 2):
+        command("observers", *given, "--workers", workers, "--out", tmp_path / str(workers))
+
+    def rows(workers):
+        with (tmp_path / str(workers) / "observers.csv").open() as file:
+            return [{name: value for name, value in row.items() if name != "ns"} for row in csv.DictReader(file)]
+
+    assert rows(1) == rows(2)

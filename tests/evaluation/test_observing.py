@@ -8,7 +8,7 @@ from smo_gym import LQR
 from smo_gym.evaluation import candidates, observing, robustness, study, velocity_errors
 from smo_gym.evaluation.draws import deviations
 from smo_gym.evaluation.open_loop import trajectories
-from smo_gym.evaluation.report.observer_panels import front
+from smo_gym.evaluation.report.observer_panels import front, neighbours
 from smo_gym.evaluation.store import Store
 from smo_gym.observers import Oracle, SlidingModeObserver
 from smo_gym.wrappers import VectorObserverWrapper
@@ -97,3 +97,8 @@ def test_pooled_errors():
     assert value == pytest.approx(np.sqrt(3.0))
     assert low < value < high
     assert np.isnan(observing.pooled(np.array([]))).all()
+
+
+def test_points_that_are_near_share_a_label():
+    points = {"a": (1.0, 10.0), "b": (2.0, 12.0), "c": (1.0, 100.0), "d": (50.0, 10.0)}
+    assert sorted(map(sorted, neighbours(points, [*points]))) == [["a", "b"], ["c"], ["d"]]

@@ -57,7 +57,7 @@ def test_a_gap_is_bridged_with_the_time_that_passed():
     estimator.reset(np.ones(1, dtype=bool), x[0, :2, None])
     times = t[keep]
     for k in range(1, len(keep)):
-        elapsed = DT if keep[k] == keep[k - 1] + 1 else times[k] - times[k - 1]
+        elapsed = None if keep[k] == keep[k - 1] + 1 else times[k] - times[k - 1]  # None is as told at the start
         estimator.update(x[keep[k], :2, None][None], u[:1], elapsed=elapsed)
         assert (estimator.xhat[:, 0] == gappy[k]).all()
     # the measurement lies on the line between two samples: a gap is as if the samples on that line had been there

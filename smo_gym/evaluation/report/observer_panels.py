@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..observing import NOISE, VELOCITIES, Row
+from ..observing import EXACT, NOISE, VELOCITIES, Row
 from .figures import STYLE
 
 if TYPE_CHECKING:
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 TITLES = {"h_dot": "h'", "theta_dot": "theta'"}
 LEAST_LAG = 0.01
 """Milliseconds: less is drawn as this."""
+NEAR = (3.0, 1.45)
+"""Factors of lag and noise gain within which points share a label."""
 ON_FRONT, BEHIND = "#0072B2", "#8A8A8A"
 
 
@@ -25,6 +28,21 @@ def front(points: Sequence[tuple[float, float]]) -> list[bool]:
         not any(a <= x and b <= y and (a, b) != (x, y) for j, (a, b) in enumerate(points) if j != i)
         for i, (x, y) in enumerate(points)
     ]
+
+
+def neighbours(points: Mapping[str, tuple[float, float]], names: Sequence[str]) -> list[list[str]]:
+    """Names of points that are so near on logarithmic axes that one label tells of them."""
+    found: list[list[str]] = []
+    for name in sorted(names, key=lambda name: points[name][1]):
+        x, y = points[name]
+        for group in found:
+            a, b = points[group[0]]
+            if max(a / x, x / a) < NEAR[0] and y / b < NEAR[1]:
+                group.append(name)
+                break
+        else:
+            found.append([name])
+    return found
 
 
 def draw(rows: Sequence[Row], names: Sequence[str], level: float) -> Figure:
@@ -37,20 +55,24 @@ def draw(rows: Sequence[Row], names: Sequence[str], level: float) -> Figure:
         for panel, channel in zip(figure.subplots(1, 2), VELOCITIES, strict=True):
             points = _points([r for r in rows if (r.channel, r.uncertainty) == (channel, level)])
             shown = [name for name in names if name in points]
-            for name, first in zip(shown, front([points[name] for name in shown]), strict=True):
-                colour = ON_FRONT if first else BEHIND
-                panel.plot(*points[name], "o", color=colour, markersize=4)
-                panel.annotate(name, points[name], (4, 3), textcoords="offset points", fontsize=6.5, color=colour)
+            best = dict(zip(shown, front([points[name] for name in shown]), strict=True))
+            for name in shown:
+                panel.plot(*points[name], "o", color=ON_FRONT if best[name] else BEHIND, markersize=4)
+            for together in neighbours(points, shown):
+                colour = ON_FRONT if any(best[name] for name in together) else BEHIND
+                told = textwrap.fill(", ".join(together), 26, break_on_hyphens=False)
+                place = max(points[name][0] for name in together), points[together[0]][1]
+                panel.annotate(told, place, (5, 0), textcoords="offset points", fontsize=6.5, color=colour, va="center")
             panel.set(xscale="log", yscale="log", title=f"{TITLES[channel]}, plants uncertain by {level:.0%}")
             panel.set_xlabel("|lag| on exact positions, ms")
             panel.set_ylabel("what noise adds, by its deviation, 1/s")
-            panel.margins(x=0.2)
+            panel.margins(x=0.25)
     return figure
 
 
 def _points(rows: Sequence[Row]) -> Mapping[str, tuple[float, float]]:
     """Lag and noise gain of each observer that has both."""
-    lag = {r.observer: max(abs(r.lag_ms), LEAST_LAG) for r in rows if r.loop == "open" and r.sensor == "exact"}
+    lag = {r.observer: max(abs(r.lag_ms), LEAST_LAG) for r in rows if r.loop == "open" and r.sensor == EXACT}
     gain = {r.observer: r.noise_gain for r in rows if r.loop == "open" and r.sensor == NOISE}
     return {
         name: (lag[name], gain[name]) for name in lag if np.isfinite(lag[name]) and 0.0 < gain.get(name, 0.0) < np.inf
