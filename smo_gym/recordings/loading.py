@@ -41,7 +41,7 @@ def load(rig: Rig, folder: Path, split: str = "test", checked: bool = True) -> t
         for entry in entries(folder, f"{rig.name}/{split}"):
             check(folder, entry)
     place = place if place.is_dir() else folder
-    paths = sorted((path for path in place.glob("*.csv") if path.name != INDEX), key=_order)
+    paths = _files(place)
     if not paths:
         raise ValueError(
             f"{folder}: has no recordings of {rig.name}: {folder / rig.name / split}/*.csv, or *.csv in it"
@@ -50,10 +50,10 @@ def load(rig: Rig, folder: Path, split: str = "test", checked: bool = True) -> t
 
 
 def holds(rig: Rig, folder: Path) -> bool:
-    """Whether a folder has recordings of a rig: a folder of its name, or files with its columns."""
+    """Whether a folder has recordings of a rig: a folder of its name, or files with its columns; or a file has them."""
     if (folder / rig.name).is_dir():
         return True
-    first = next(iter(sorted(folder.glob("*.csv"))), None)
+    first = folder if folder.is_file() else next(iter(_files(folder)), None)
     try:
         return first is not None and {*rig.columns} <= {*logged.columns(first)}
     except ValueError:
@@ -100,6 +100,10 @@ def _late(u: Array, delay: float) -> Array:
     whole, rest = math.floor(delay), delay % 1.0
     padded = np.concatenate([np.full(whole + 1, u[0]), u])
     return np.asarray((1.0 - rest) * padded[1 : len(u) + 1] + rest * padded[: len(u)])
+
+
+def _files(place: Path) -> list[Path]:
+    return sorted((path for path in place.glob("*.csv") if path.name != INDEX), key=_order)
 
 
 def _order(path: Path) -> tuple[int, str]:

@@ -5,6 +5,7 @@ import pytest
 from conftest import ROOT
 
 from smo_gym.recordings import CART_POLE, RIGS, load
+from smo_gym.recordings.loading import holds
 
 DATA = ROOT.parent / "shared" / "data"
 PERIOD = CART_POLE.period
@@ -24,6 +25,17 @@ def written(path, header=COLUMNS, **changes):
 def test_a_file_is_taken_alone(tmp_path):
     (found,) = load(CART_POLE, written(tmp_path / "mine.csv"))
     assert found.name == "mine"
+
+
+def test_a_rig_is_known_by_its_folder_or_by_its_columns(tmp_path):
+    mine = written(tmp_path / "mine.csv")
+    (tmp_path / "index.csv").write_text("file,sha256\n")  # the first by name, and no recording
+    for place in (tmp_path, mine):
+        assert [name for name, rig in RIGS.items() if holds(rig, place)] == ["cartpole"]
+    (tmp_path / "qube").mkdir()
+    assert holds(RIGS["qube"], tmp_path)
+    assert not holds(CART_POLE, tmp_path / "qube")
+    assert not holds(CART_POLE, tmp_path / "nowhere")
 
 
 def test_columns_go_by_name(tmp_path):
