@@ -20,6 +20,7 @@ COMMANDS = {
     "observers": "a dozen observers and more, on simulated encoders and on recordings of real ones",
     "observe": "estimate velocities of a plant of your own from a CSV file",
     "tune": "tune observers, all with the same budget",
+    "fit": "fit a rig's model and noise to its recordings, with standard errors",
     "consistency": "the article's averages and reductions against its own cells",
     "identify": "recover what the article does not print",
     "reference": "the minimum-energy reference of the tracking scenario",

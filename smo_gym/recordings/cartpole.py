@@ -67,4 +67,5 @@ CART_POLE = Rig(
     window=(7, 4),
     jerk=(1500.0, 150.0),  # chosen: on twins it is 0.0093 m/s and 0.059 rad/s from the truth
     parts={"gain": (4,), "inverse_length": (0, 1)},
+    held=("noise h",),
 )

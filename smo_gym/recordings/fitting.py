@@ -6,14 +6,14 @@ grey box: the equations are given, their numbers are not.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..typing import Array
 from ..validation import choice
-from .filtering import filtered
+from .filtering import SETTLED, filtered
 from .rig import Recording, Rig
 from .searching import search
 
@@ -43,13 +43,26 @@ class Fit:
     evaluations: int
 
 
+def numbers(rig: Rig) -> dict[str, float]:
+    """What of a rig can be fitted, by name."""
+    first, second = rig.model.names
+    names = (*rig.numbers, f"noise {first}", f"noise {second}", f"acceleration {first}", f"acceleration {second}")
+    return dict(zip(names, (*rig.model.params, *rig.noise, *rig.acceleration), strict=True))
+
+
 def loss(rig: Rig, recordings: Sequence[Recording]) -> float:
     """-log of the likelihood of a rig's model and noise for each measurement, but for the constant."""
     runs = [filtered(rig, recording) for recording in recordings]
     return sum(run.loss for run in runs) / sum(run.innovations for run in runs)
 
 
-def fit(rig: Rig, recordings: Sequence[Recording], held: Collection[str] = (), rounds: int = ROUNDS) -> Fit:
+def fit(
+    rig: Rig,
+    recordings: Sequence[Recording],
+    held: Collection[str] = (),
+    rounds: int = ROUNDS,
+    told: Callable[[int], object] = lambda evaluations: None,
+) -> Fit:
     """Fit the numbers of a rig's model, and its noise, from where they are.
 
     Args:
@@ -58,15 +71,27 @@ def fit(rig: Rig, recordings: Sequence[Recording], held: Collection[str] = (), r
         held: what is not fitted: of the rig's ``numbers``, or "noise" or "acceleration" with the name of a position
             behind it, as "noise h".
         rounds: of the search, at most.
+        told: of each evaluation of the likelihood.
 
     Raises:
-        ValueError: a name that is held is not known.
+        ValueError: a name that is held is not known, a recording is too short, or there are not fewer numbers than
+            measurements, or none.
         NotConverged: it did not converge; the message says why and what to do.
     """
-    names = _names(rig)
+    names = tuple(numbers(rig))
     for name in held:
         choice("number", name, names)
     free = np.array([name not in held for name in names])
+    for each in recordings:
+        if len(each.t) <= SETTLED:
+            raise ValueError(
+                f"{each.name}: has {len(each.t)} samples, a fit wants more than {SETTLED} of each recording"
+            )
+    count = 2 * sum(len(each.t) - SETTLED for each in recordings)
+    if not 0 < free.sum() < count:
+        raise ValueError(
+            f"{free.sum()} numbers, {count} measurements: must be some, and more: hold others, or add runs"
+        )
     start = np.append(rig.model.params, np.zeros(_NOISES))
     evaluations = 0
 
@@ -78,28 +103,24 @@ def fit(rig: Rig, recordings: Sequence[Recording], held: Collection[str] = (), r
     def total(values: Array) -> float:
         nonlocal evaluations
         evaluations += 1
+        told(1)
         found = sum(filtered(at(values), recording).loss for recording in recordings)
         return found if np.isfinite(found) else np.finfo(float).max
 
     best = search(total, start[free], rounds)
-    told = tuple(name for name in names if name not in held)
+    fitted = tuple(name for name in names if name not in held)
     if not best.converged:
         why = "is flat" if best.flat else f"would rise by another {best.left:.3g}"
-        hold = (*held, told[best.loosest])
+        loosest = fitted[best.loosest]
         raise NotConverged(
-            f"after {evaluations} evaluations the log-likelihood {why}, most of all along {hold[-1]!r}: hold what "
-            f"these recordings do not tell apart (held={hold!r}), or allow more rounds than {rounds}"
+            f"after {evaluations} evaluations the log-likelihood {why}, most of all along {loosest!r}: hold what "
+            f"these recordings do not tell apart ({', '.join((*held, loosest))}), or allow more rounds than {rounds}"
         )
     found = at(best.x)
     noise = np.array([*found.noise, *found.acceleration])
     values, units = np.append(found.model.params, noise), np.append(np.ones(len(found.model.params)), noise)
     errors = best.errors * units[free]
-    return Fit(found, told, values[free], errors, loss(found, recordings), best.left, evaluations)
-
-
-def _names(rig: Rig) -> tuple[str, ...]:
-    first, second = rig.model.names
-    return (*rig.numbers, f"noise {first}", f"noise {second}", f"acceleration {first}", f"acceleration {second}")
+    return Fit(found, fitted, values[free], errors, loss(found, recordings), best.left, evaluations)
 
 
 def _scaled(rig: Rig, vector: Array) -> Rig:

@@ -23,6 +23,11 @@ class Recording:
     fault: Flags
     """Samples at which the sensor of the second position says nothing, (samples,)."""
 
+    def between(self, first: float, last: float) -> Recording:
+        """The samples from one time on to before another, in s."""
+        kept = (self.t >= first) & (self.t < last)
+        return Recording(self.name, self.t[kept], self.y[kept], self.u[kept], self.fault[kept])
+
 
 @dataclass(frozen=True, slots=True)
 class Rig:
@@ -59,6 +64,8 @@ class Rig:
     """Jerks per root Hz that the model-free smoother grants."""
     parts: Mapping[str, tuple[int, ...]]
     """Which of the model's numbers grow with the motor's gain and with the inverse of the pendulum's length."""
+    held: tuple[str, ...] = ()
+    """What is not fitted, as :func:`.fitting.fit` names it, because recordings do not tell it."""
 
     def of(self, params: Sequence[float]) -> Rig:
         """The rig with other numbers of its model."""
