@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         files.write_set(out, made, RESULTS)
     print(_table(told["numbers"]))
     print(
-        f"\n{told['recordings']} recordings, {told['samples']} samples; -log of the likelihood for each measurement "
+        f"\nrecordings: {told['recordings']}, samples: {told['samples']}; -log of the likelihood for each measurement "
         f"{told['loss']:.4f}, with the shipped numbers {told['shipped_loss']:.4f}"
     )
     if rows:

@@ -50,7 +50,7 @@ def _own(tmp_path, monkeypatch):
 def test_the_numbers_of_twins_are_found_within_their_errors(command, swings, tmp_path):
     done = command("fit", "fitted_rig:RIG", "--data", swings, "--out", tmp_path / "out")
 
-    assert f"4 recordings, {4 * N} samples" in done.stdout
+    assert f"recordings: 4, samples: {4 * N}" in done.stdout
     told = yaml.safe_load((tmp_path / "out" / "fit.yaml").read_text())
     assert (told["rig"], told["recordings"], told["samples"]) == ("cartpole", 4, 4 * N)
     assert told["loss"] < told["shipped_loss"]
