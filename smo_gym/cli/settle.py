@@ -17,15 +17,14 @@ import yaml
 from tqdm import tqdm
 
 from .. import files
-from ..evaluation import claims, claims_of_runs, claims_of_theory, evidence, settled, settling, settling_search
+from ..evaluation import claims, claims_of_runs, claims_of_theory, evidence, settled, settling, settling_search, store
 from ..evaluation.report import settling_tables
 from ..evaluation.settling import Runs
-from ..evaluation.store import FOLDER, Store
 from ..evaluation.study import simulated_seconds
 from ..evaluation.theorem_pieces import RUNS
 from . import computing, narrow
 from .arguments import Parser
-from .entry import command
+from .entry import Stop, command
 from .progress import simulated
 from .starting import line
 
@@ -58,7 +57,7 @@ def _measure(args: argparse.Namespace) -> int:
             outcomes = iter(measure(every, args.seed, bar.update))
         runs = Runs({place: [next(outcomes) for _ in groups] for place, groups in wanted.items()})
         with tqdm(total=evidence.WORK, desc="theorem", leave=False, disable=None) as bar:
-            found = evidence.evidence(args.seed, Store(out / FOLDER), bar.update)
+            found = evidence.evidence(args.seed, store.Store(out / store.FOLDER), bar.update)
         told = [
             *claims_of_runs.claims(runs, _line("settle", args.runs, args.seed), line("consistency")),
             *claims_of_theory.claims(found, _line("settle", args.runs, args.seed), _line("theorem", RUNS, args.seed)),
@@ -92,9 +91,12 @@ def _shown(told: Sequence[claims.Claim]) -> str:
 
 
 def _search(args: argparse.Namespace) -> int:
-    with files.claimed(args.out, (FOUND,)) as out, settling.measuring():
-        with tqdm(total=settling_search.EVALUATIONS, unit="evaluation", leave=False, disable=None) as bar:
-            found = settling_search.searched(bar.update)
+    with files.claimed(args.out, (FOUND,)) as out, store.kept(out) as kept, settling.measuring():
+        try:
+            with tqdm(total=settling_search.EVALUATIONS, unit="evaluation", leave=False, disable=None) as bar:
+                found = settling_search.searched(kept, bar.update)
+        except KeyboardInterrupt:
+            raise Stop(f"interrupted; the same command goes on from what is in {out}") from None
         text = yaml.safe_dump(found, sort_keys=False, width=120, default_flow_style=None)
         try:
             files.write_set(out, {FOUND: text})

@@ -42,7 +42,7 @@ class Rule:
 
 @dataclass(frozen=True, slots=True)
 class Printed:
-    """When a printed number holds: it lies in the interval, or rounds from the number where there is none.
+    """When a printed number holds: it lies in the interval, or at the number where there is none, up to a tolerance.
 
     Where as many settings were fitted to it as there are numbers, agreement decides nothing.
     """
@@ -63,7 +63,8 @@ class Printed:
     @property
     def said(self) -> str:
         """The rule in words."""
-        return f"{self.value:g} lies in it"
+        more = f", give or take {self.tolerance:.2g}" if self.tolerance else ""
+        return f"{self.value:g} lies in it{more}"
 
 
 def above(bound: float) -> Rule:

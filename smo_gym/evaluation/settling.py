@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -21,9 +22,9 @@ from .scenario import Scenario
 from .settled import STARTS, Settled, Start
 from .study import Group, Outcome
 
-MATCHED, EFFORT, BETA_1, BETA_2 = "matched", "equal effort", "tuned constant", "tuned beta_2"
+MATCHED, EFFORT, BETA_1, BETA_2, TRUE = "matched", "equal effort", "tuned constant", "tuned beta_2", "true state"
 CONSTANT = (MATCHED, EFFORT)
-ARMS = (WITHOUT, WITH, MATCHED, EFFORT, BETA_1, BETA_2, ORACLE)
+ARMS = (WITHOUT, WITH, MATCHED, EFFORT, BETA_1, BETA_2, TRUE)
 """In the tables' order."""
 LAWS = {"regulation": ("lqr", "smc"), "initial-conditions": ("lqr", "smc"), "tracking": ("smc",)}
 """Controllers of each scenario."""
@@ -67,6 +68,10 @@ METER = Meter(
 )
 
 
+named = cache(scenario.named)
+"""A scenario of ours by name; each is read once."""
+
+
 def measuring() -> AbstractContextManager[None]:
     """While it lasts, runs also measure the mean force, and errors of the velocities as shares of these."""
     return metrics.measuring([METER])
@@ -88,7 +93,7 @@ class Column:
 
     def place(self, gains: Mapping[str, Any] | None = None) -> Scenario:
         """Its scenario, with the observer's start and, where some are given, other gains."""
-        place = scenario.named(self.scenario)
+        place = named(self.scenario)
         settings = place.controllers[self.controller]
         observer = settings.observer
         if self.start == "measured":
@@ -100,7 +105,7 @@ class Column:
     @property
     def printed(self) -> Gains:
         """The gains of Table 3."""
-        return Gains.of(scenario.named(self.scenario).controllers[self.controller].observer.gains.value)
+        return Gains.of(named(self.scenario).controllers[self.controller].observer.gains.value)
 
     def constant(self, c: float) -> dict[str, Any]:
         """The printed gains as if |u| were always c newtons."""
@@ -127,7 +132,7 @@ class Column:
 
     def groups(self, arm: str, found: Settled, runs: int) -> list[Group]:
         """An arm's groups."""
-        observer = arm if arm in (WITHOUT, ORACLE) else WITH
+        observer = {WITHOUT: WITHOUT, TRUE: ORACLE}.get(arm, WITH)
         return study.groups([self.place(self.gains(arm, found))], [self.controller], [observer], runs)
 
 

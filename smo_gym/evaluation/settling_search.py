@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from ..article import WITH, WITHOUT
 from ..typing import Array
 from . import study
 from .settling import BETA_1, BETA_2, COLUMNS, MEAN_FORCE, STATES, Column
+from .store import Store, digest
 from .study import Group
 from .tuning import Tuned, tune
 
@@ -45,20 +46,22 @@ def matched(column: Column, told: Told) -> tuple[float, float, float]:
     for c in CONSTANTS:
         efforts.append(trained(column, column.constant(float(c)))["effort"])
         told(1)
-    c, share = equal(np.array([0.0, *CONSTANTS]), np.array(efforts) / compensated["effort"])
-    return compensated[MEAN_FORCE], c, share
+    mean = compensated[MEAN_FORCE]
+    return mean, *equal(np.array([0.0, *CONSTANTS]), np.array(efforts) / compensated["effort"], mean)
 
 
-def equal(constants: Array, efforts: Array) -> tuple[float, float]:
-    """The least c at which the effort is 1, interpolated, or where it comes nearest; and the effort there."""
+def equal(constants: Array, efforts: Array, mean: float) -> tuple[float, float]:
+    """The c at which the effort is 1, interpolated, or where it comes nearest; and the effort there.
+
+    Effort may fall and rise again with c: of several such c the one nearest to ``mean`` is taken, in ratio.
+    """
     above = np.log(efforts)
-    crossings = np.flatnonzero(above[:-1] * above[1:] < 0.0)
-    if not len(crossings):
+    i = np.flatnonzero(above[:-1] * above[1:] < 0.0)
+    if not len(i):
         nearest = int(np.argmin(np.abs(above)))
         return float(constants[nearest]), float(efforts[nearest])
-    i = crossings[0]
-    share = above[i] / (above[i] - above[i + 1])
-    return float(constants[i] + share * (constants[i + 1] - constants[i])), 1.0
+    crossings = constants[i] + above[i] / (above[i] - above[i + 1]) * (constants[i + 1] - constants[i])
+    return float(crossings[np.argmin(np.abs(np.log(crossings / mean)))]), 1.0
 
 
 def search(column: Column, name: str, mean: float, told: Told) -> Tuned:
@@ -82,24 +85,51 @@ def search(column: Column, name: str, mean: float, told: Told) -> Tuned:
     return tune(cost, begin, BUDGET, SEED, told)
 
 
-def searched(told: Told) -> dict[str, Any]:
-    """All of it, as the settings file has it."""
+def searched(store: Store, told: Told) -> dict[str, Any]:
+    """All of it, as the settings file has it.
+
+    Args:
+        store: keeps what is found, and gives what was found before.
+        told: called with the number of evaluations done since the last call, of :data:`EVALUATIONS`.
+    """
     found: dict[str, Any] = {"seed": SEED, "plants": PLANTS, "budget": BUDGET, "matched": {}, "tuned": {}}
     means: dict[Column, float] = {}
     for column in COLUMNS:
-        means[column], effort, share = matched(column, told)
+
+        def weigh(column: Column = column) -> Sequence[float]:
+            return matched(column, told)
+
+        means[column], effort, share = _once(store, told, column, "matched", 2 + len(CONSTANTS), weigh)
         notes = "N; mean of |u| under compensation", f"N; effort {share:.3g} times that under compensation"
-        values = (means[column], effort)
         _at(found["matched"], column)[column.start] = {
             key: _identified(float(f"{value:.4g}"), note)
-            for key, value, note in zip(("mean", "effort"), values, notes, strict=True)
+            for key, value, note in zip(("mean", "effort"), (means[column], effort), notes, strict=True)
         }
     for column in TRAINED:
         _at(found["tuned"], column)[column.start] = both = {}
         for key, name in (("beta_1", BETA_1), ("beta_2", BETA_2)):
-            tuned = search(column, name, means[column], told)
-            note = f"CMA-ES, {tuned.evaluations} evaluations: cost {tuned.start:.4g} -> {tuned.cost:.4g}"
-            both[key] = _identified(tuned.value, note)
+
+            def look(column: Column = column, name: str = name) -> Sequence[float]:
+                tuned = search(column, name, means[column], told)
+                return *tuned.value, tuned.evaluations, tuned.start, tuned.cost
+
+            *value, evaluations, start, cost = _once(store, told, column, name, BUDGET, look)
+            note = f"CMA-ES, {evaluations:.0f} evaluations; cost {start:.4g} at the start, {cost:.4g} in the end"
+            both[key] = _identified(value, note)
+    return found
+
+
+def _once(
+    store: Store, told: Told, column: Column, what: str, work: int, find: Callable[[], Sequence[float]]
+) -> list[float]:
+    """What is found, or kept from before."""
+    settings = column.place().model_dump(mode="json")
+    key = digest(["settling", what, settings, SEED, PLANTS, BUDGET, LEVEL, CONSTANTS.tolist()])
+    if (kept := store.read(key)) is not None:
+        told(work)
+        return kept["found"].tolist()  # type: ignore[no-any-return]
+    found = [float(value) for value in find()]
+    store.write(key, {"found": np.array(found)})
     return found
 
 
