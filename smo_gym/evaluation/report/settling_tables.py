@@ -77,22 +77,27 @@ def as_csv(found: Sequence[Row]) -> str:
 
 
 def tables(found: Sequence[Row], form: str) -> str:
-    """A table for each column, in a format of tabulate."""
+    """A table for each column, in a format of tabulate; medians and counts of runs are in the file's alone."""
     titles = list(dict.fromkeys(row.column for row in found))
     return "\n\n".join(_table(title, [row for row in found if row.column == title], form) for title in titles)
 
 
 def _table(title: str, mine: Sequence[Row], form: str) -> str:
-    header = ("observer", "MSE h", "theta", "effort", "peak, N", "h', m/s", "theta'", "less h, %", "less theta, %")
+    header = ["observer", "MSE h", "theta", "effort", "peak, N", "h', m/s", "theta'", "less h, %", "less theta, %"]
     lines = [
-        (
+        [
             f"{row.arm}, {row.failed} failed" if row.failed else row.arm,
             *(f"{row.means[name]:.3g}" for name in (*MSE, "effort", "peak_force")),
             *(f"{row.means[name]:.2g}" for name in SPEEDS),
             *("" if row.arm == WITH else _taken(row.reductions[state]) for state in STATES),
-        )
+        ]
         for row in mine
     ]
+    if form == "github":
+        header += ["median h", "theta", "better, worse h", "theta"]
+        for line, row in zip(lines, mine, strict=True):
+            line += [f"{row.medians[name]:.3g}" for name in MSE]
+            line += ["" if row.arm == WITH else f"{row.better[state]}, {row.worse[state]}" for state in STATES]
     return f"{formats.heading(title, form, 3)}\n\n{formats.table(form, header, lines)}"
 
 
