@@ -5,6 +5,7 @@ import re
 
 import pytest
 import yaml
+from conftest import ROOT
 
 from smo_gym.cli import settle
 from smo_gym.evaluation import evidence, settled, settling_search
@@ -44,6 +45,8 @@ def test_it_writes_all_and_prints_all(tmp_path, monkeypatch, capsys):
     assert places == wanted | {f"Conclusion {i}" for i in range(1, 6)}
     assert {line["verdict"] for line in lines} <= {"holds", "fails", "undecided"}
     assert all(line["number"] and line["command"].startswith("smo-gym ") for line in lines)
+    page = (ROOT / "docs" / "claims.md").read_text(encoding="utf-8").replace("\\", "")
+    assert all(f"| {line['place']} | {line['claim'].partition(' (least')[0]}" in page for line in lines)
     shown = capsys.readouterr().out
     assert max(map(len, shown.splitlines())) <= 100
     assert f"Of {len(lines)} statements: " in shown
