@@ -67,13 +67,14 @@ def _measure(args: argparse.Namespace) -> int:
         made: dict[str, str | bytes] = {
             RESULTS[0]: claims.as_csv(told),
             RESULTS[1]: settling_tables.as_csv(rows),
-            RESULTS[2]: f"{settling_tables.tables(rows, 'github')}\n\n{claims.table(told, 'github')}\n",
+            RESULTS[2]: f"{settling_tables.as_markdown(rows)}\n\n{claims.table(told, 'github')}\n",
         }
         try:
             files.write_set(out, made)
         finally:  # what cannot be written can be read at least
-            print(settling_tables.tables(rows, "simple"))
-            print(f"\n{_shown(told)}\n\n{narrow.paragraph(claims.counts(told))}")
+            for each in settling_tables.tables(rows, whole=False):
+                print(f"{each.title}\n\n{narrow.table(each.header, each.lines)}\n")
+            print(f"{_shown(told)}\n\n{narrow.paragraph(claims.counts(told))}")
     print(f"\nresults of {simulated_seconds(every):,.0f} simulated seconds are in {args.out}")
     return 0
 

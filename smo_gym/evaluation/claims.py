@@ -36,8 +36,7 @@ class Rule:
     @property
     def said(self) -> str:
         """The rule in words."""
-        sign = ">" if self.kind == "above" else "<"
-        return "it is finite" if math.isinf(self.bound) else f"{sign} {self.bound:g}"
+        return "finite" if math.isinf(self.bound) else f"{self.kind} {self.bound:g}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +62,8 @@ class Printed:
     @property
     def said(self) -> str:
         """The rule in words."""
-        more = f", give or take {self.tolerance:.2g}" if self.tolerance else ""
-        return f"{self.value:g} lies in it{more}"
+        more = f" ± {self.tolerance:.2g}" if self.tolerance else ""
+        return f"around {self.value:g}{more}"
 
 
 def above(bound: float) -> Rule:

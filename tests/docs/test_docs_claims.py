@@ -16,14 +16,12 @@ ROWS = [[cell.strip().replace("\\", "") for cell in re.split(r"(?<!\\)\|", line)
 
 
 def rule(said, claim):
-    if said == "it is finite":
+    if said == "finite":
         return below(math.inf)
-    if "lies in it" in said:
-        value, _, tolerance = said.replace(",", "").partition(" lies in it")
-        more = float(tolerance.rpartition(" ")[2]) if tolerance else 0.0
-        return Printed(float(value), more, fitted=claim.startswith("Table 7"))
-    sign, bound = said.split()
-    return {">": above, "<": below}[sign](float(bound))
+    kind, bound, *tolerance = re.findall(r"[\w.+-]+", said)
+    if kind == "around":
+        return Printed(float(bound), *map(float, tolerance), fitted=claim.startswith("Table 7"))
+    return {"above": above, "below": below}[kind](float(bound))
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row[1][:60])

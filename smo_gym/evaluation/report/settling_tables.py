@@ -76,13 +76,30 @@ def as_csv(found: Sequence[Row]) -> str:
     return formats.as_csv(header, lines)
 
 
-def tables(found: Sequence[Row], form: str) -> str:
-    """A table for each column, in a format of tabulate; medians and counts of runs are in the file's alone."""
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A column's arms, to be put into a format."""
+
+    title: str
+    header: list[str]
+    lines: list[list[str]]
+
+
+def tables(found: Sequence[Row], whole: bool) -> list[Table]:
+    """A table for each column; the whole of it has medians and counts of runs, too."""
     titles = list(dict.fromkeys(row.column for row in found))
-    return "\n\n".join(_table(title, [row for row in found if row.column == title], form) for title in titles)
+    return [_table(title, [row for row in found if row.column == title], whole) for title in titles]
 
 
-def _table(title: str, mine: Sequence[Row], form: str) -> str:
+def as_markdown(found: Sequence[Row]) -> str:
+    """All tables for a file."""
+    return "\n\n".join(
+        f"{formats.heading(each.title, 'github', 3)}\n\n{formats.table('github', each.header, each.lines)}"
+        for each in tables(found, whole=True)
+    )
+
+
+def _table(title: str, mine: Sequence[Row], whole: bool) -> Table:
     header = ["observer", "MSE h", "theta", "effort", "peak, N", "h', m/s", "theta'", "less h, %", "less theta, %"]
     lines = [
         [
@@ -93,12 +110,12 @@ def _table(title: str, mine: Sequence[Row], form: str) -> str:
         ]
         for row in mine
     ]
-    if form == "github":
+    if whole:
         header += ["median h", "theta", "better, worse h", "theta"]
         for line, row in zip(lines, mine, strict=True):
             line += [f"{row.medians[name]:.3g}" for name in MSE]
             line += ["" if row.arm == WITH else f"{row.better[state]}, {row.worse[state]}" for state in STATES]
-    return f"{formats.heading(title, form, 3)}\n\n{formats.table(form, header, lines)}"
+    return Table(title, header, lines)
 
 
 def _taken(found: Estimate) -> str:
