@@ -48,7 +48,9 @@ def test_it_writes_all_and_prints_all(tmp_path, monkeypatch, capsys):
     page = (ROOT / "docs" / "claims.md").read_text(encoding="utf-8").replace("\\", "")
     assert all(f"| {line['place']} | {line['claim'].partition(' (')[0]}" in page for line in lines)
     shown = capsys.readouterr().out
-    assert max(map(len, shown.splitlines())) <= 100
+    *tables, where = shown.splitlines()
+    assert max(map(len, tables)) <= 100
+    assert where.endswith(f"are in {tmp_path}")
     assert f"Of {len(lines)} statements: " in shown
     arms = [*csv.DictReader((tmp_path / "settle.csv").read_text().splitlines())]
     assert len(arms) == 10 * 7
