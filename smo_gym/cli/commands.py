@@ -19,6 +19,7 @@ COMMANDS = {
     "robustness": "real encoders, and the largest push that the upright plant stands",
     "observers": "a dozen observers and more, on simulated encoders and on recordings of real ones",
     "observe": "estimate velocities of a plant of your own from a CSV file",
+    "settle": "what the compensation does, and each of the article's claims with a number and a verdict",
     "tune": "tune observers, all with the same budget",
     "fit": "fit a rig's model and noise to its recordings, with standard errors",
     "consistency": "the article's averages and reductions against its own cells",
