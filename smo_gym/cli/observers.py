@@ -34,7 +34,7 @@ FIGURE = "observers"
 def main(arguments: Sequence[str] | None = None) -> int:
     """Measure; 0 when all went well, 2 for a bad argument or setting, 130 when interrupted."""
     parser = Parser("observers", __doc__)
-    parser.add_argument("--data", type=Path, metavar="DIR", help="folder of recordings; simulated encoders by default")
+    parser.add_argument("--data", type=Path, metavar="DIR", help="recordings, a folder or file (default: simulated)")
     parser.add_argument("--observer", default=None, metavar="NAME", help="some of them (default: all)", **several(str))
     parser.add_argument(
         "--sensor",

@@ -14,9 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from scipy import stats
 from tqdm import tqdm
 
@@ -26,15 +24,15 @@ from .. import (
     Gains,
     SlidingModeController,
     SlidingModeObserver,
-    VectorObserverWrapper,
     files,
     theorem,
 )
-from ..evaluation import configs, rollout, scenario, store, theorem_sweep
+from ..evaluation import configs, scenario, store, theorem_sweep
 from ..evaluation.scenario import Scenario, TheoremSettings
 from ..evaluation.theorem_on_runs import SHARES, Convergence
-from ..evaluation.theorem_pieces import converge_in_pieces
+from ..evaluation.theorem_pieces import converge_in_pieces, drawn
 from ..evaluation.traces import Traces
+from ..evaluation.tracing import traced
 from . import narrow
 from .arguments import Parser
 from .entry import command
@@ -98,10 +96,7 @@ def parts(
     told.say(
         f"The designed observer wants a step of {1e3 * (observer.step or DT):.3g} ms with slopes {observer.slopes}.\n"
     )
-    rng = np.random.default_rng(seed)
-    low, high = np.array(settings.starts.value)
-    starts = rng.uniform(low, high, (count, 4))
-    plants = np.array([CartPendulum().draw(over.uncertainty, rng).as_array() for _ in range(count)])
+    starts, plants = drawn(settings, over, count, seed)
     lqr = article.controllers["lqr"]
     printed = lqr.observer.build(compensation=True)
     observers = {
@@ -130,7 +125,8 @@ def parts(
             progress=bar.update,
         )
     runs(told, found, settings)
-    traces = {name: along(article, name) for name in article.controllers}
+    cases = len(article.initial_states.value)
+    traces = {name: traced(article, name, cases) for name in article.controllers}
     trajectories(told, article, traces)
     switching(told, article, traces["smc"])
     return in_words(gains, over, found)
@@ -241,20 +237,6 @@ def swept(told: Told, settings: TheoremSettings, over: theorem.OperatingSet, cou
         rows = [row.said() for row in theorem_sweep.sweep(*given, told=bar.update)]
     told.say(f"\nRemark 2 on {count} runs from the edge of the box of starts:\n")
     told.table(theorem_sweep.HEADER, rows)
-
-
-def along(article: Scenario, controller: str) -> Traces:
-    """Runs of Table 5's cases on the nominal plant, with compensation."""
-    observer, cases = article.controllers[controller].observer, article.initial_states.value
-    env = gymnasium.make_vec(
-        "SMOPendulum-v0", len(cases), autoreset_mode=AutoresetMode.DISABLED, **article.environment_options
-    )
-    observed = VectorObserverWrapper(env, observer.build(compensation=True))
-    plants = np.repeat(CartPendulum().as_array()[None], len(cases), axis=0)
-    options = {"state": np.array(list(cases.values())), "params": plants}
-    result = rollout(observed, article.agent(controller), options=options, trace_every=1)
-    assert result.traces is not None
-    return result.traces
 
 
 def trajectories(told: Told, article: Scenario, traces: dict[str, Traces]) -> None:

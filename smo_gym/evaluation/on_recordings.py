@@ -12,8 +12,12 @@ import numpy as np
 from ..models import Model
 from ..recordings import scoring, smoothing
 from ..recordings.rig import Recording, Rig
+from ..recordings.twins import twin
 from ..typing import Array
 from .candidates import Candidate
+
+TRUTH = "truth"
+"""The reference of twins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +60,13 @@ class Runs:
     def of(cls, rig: Rig, recordings: Sequence[Recording]) -> Runs:
         """Recordings with all references."""
         return cls(rig, recordings, smoothing.references(rig, recordings))
+
+    @classmethod
+    def twins(cls, rig: Rig, recordings: Sequence[Recording], seed: int) -> Runs:
+        """Twins of recordings, whose true velocities are known."""
+        seeds = np.random.SeedSequence(seed).generate_state(len(recordings)).tolist()
+        made = [twin(rig, recording, own) for recording, own in zip(recordings, seeds, strict=True)]
+        return cls(rig, [each for each, _ in made], {TRUTH: [x[:, 2:] for _, x in made]})
 
     @property
     def force(self) -> float:

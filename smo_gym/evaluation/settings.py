@@ -9,8 +9,10 @@ from pydantic import (
     AfterValidator,
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
     SerializerFunctionWrapHandler,
+    Tag,
     field_serializer,
     field_validator,
     model_validator,
@@ -29,6 +31,11 @@ Four = tuple[float, float, float, float]
 Coordinate = Annotated[float, Field(ge=-1e4, le=1e4)]
 State = tuple[Coordinate, Coordinate, Coordinate, Coordinate]
 """A state [h, theta, h', theta'] in m, rad, m/s, rad/s."""
+Start = Annotated[
+    Annotated[State, Tag("state")] | Annotated[Literal["measured"], Tag("word")],
+    Discriminator(lambda given: "word" if isinstance(given, str) else "state"),
+]
+"""Where an estimate begins: a state, or "measured" for [y(0), 0, 0]."""
 Fraction = Annotated[float, Field(ge=0.0, lt=1.0)]
 Name = Annotated[str, Field(max_length=200)]
 Horizon = Annotated[float, Field(le=1e5)]
@@ -108,7 +115,7 @@ class ObserverSettings(Settings):
 
     gains: Setting[str | dict[str, tuple[float, float]]]
     slopes: Setting[tuple[float, float]]
-    xhat0: Setting[State]
+    xhat0: Setting[Start]
     time_constant: Setting[float] = Setting[float](value=0.0, source="chosen")
     step: Setting[Step | None] = Setting[Step | None](value=None, source="chosen")
 

@@ -10,14 +10,24 @@ import numpy as np
 
 from ..controllers import LQR
 from ..observers import SlidingModeObserver
+from ..plant import CartPendulum
 from ..theorem import OperatingSet
 from ..typing import Array
+from .settings import TheoremSettings
 from .store import Store, digest
 from .theorem_on_runs import Convergence, converge
 
 RUNS = 500
 """Of a piece: some seconds' work."""
 _OF_RUNS = ("stayed", "promised", "reached", "promised_velocity", "velocity_error", "bounded", "velocity_settled")
+
+
+def drawn(settings: TheoremSettings, over: OperatingSet, runs: int, seed: int) -> tuple[Array, Array]:
+    """Random starts x(0), (runs, 4), and plants [M_c, m, l, g], (runs, 4)."""
+    rng = np.random.default_rng(seed)
+    low, high = np.array(settings.starts.value)
+    starts = rng.uniform(low, high, (runs, 4))
+    return starts, np.array([CartPendulum().draw(over.uncertainty, rng).as_array() for _ in range(runs)])
 
 
 def converge_in_pieces(

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import hashlib
 import math
 import re
-from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,49 +11,49 @@ import numpy as np
 from ..typing import Array
 from ..validation import choice
 from . import logged
+from .indexed import INDEX, check, entries
 from .rig import Recording, Rig
 
-INDEX = "index.csv"
-"""In the folder of all recordings: files, hashes and where they come from."""
 SPLITS = ("train", "test")
 _SAME = 0.02
 """A file whose period differs by more than this share from the rig's keeps its own."""
 
 
 def load(rig: Rig, folder: Path, split: str = "test", checked: bool = True) -> tuple[Recording, ...]:
-    """The recordings of a rig, ``folder/RIG/SPLIT/*.csv``, or those that lie in ``folder`` itself.
+    """The recordings of a rig: ``folder/RIG/SPLIT/*.csv``, or those that lie in ``folder`` itself, or one file.
 
     Args:
         rig: of which.
-        folder: that was named.
+        folder: that was named, or a file.
         split: "train" or "test".
-        checked: whether a file that the folder's index names must have the hash that stands there.
+        checked: whether all files that the folder's index names must be there and have the hashes that stand there.
 
     Raises:
-        ValueError: there is none; one cannot be read, lacks a column, has samples that are not finite or a time that
-            runs backwards, has an angle in degrees, or is another one than the index says. Nothing is used then.
+        ValueError: there is none; one cannot be read, lacks a column, has samples that are not finite, too near to each
+            other or in a time that runs backwards, has an angle in degrees, or is missing or another one than the index
+            says. Nothing is used then.
     """
     choice("split", split, SPLITS)
+    if folder.is_file():
+        return (read(rig, folder),)
     place = folder / rig.name / split
+    if checked:
+        for entry in entries(folder, f"{rig.name}/{split}"):
+            check(folder, entry)
     place = place if place.is_dir() else folder
-    paths = sorted(place.glob("*.csv"), key=_order)
-    paths = [path for path in paths if path.name != INDEX]
+    paths = _files(place)
     if not paths:
         raise ValueError(
             f"{folder}: has no recordings of {rig.name}: {folder / rig.name / split}/*.csv, or *.csv in it"
         )
-    if checked:
-        known = _index(folder)
-        for path in paths:
-            _check(path, known.get(path.relative_to(folder).as_posix()))
     return tuple(read(rig, path) for path in paths)
 
 
 def holds(rig: Rig, folder: Path) -> bool:
-    """Whether a folder has recordings of a rig: a folder of its name, or files with its columns."""
+    """Whether a folder has recordings of a rig: a folder of its name, or files with its columns; or a file has them."""
     if (folder / rig.name).is_dir():
         return True
-    first = next(iter(sorted(folder.glob("*.csv"))), None)
+    first = folder if folder.is_file() else next(iter(_files(folder)), None)
     try:
         return first is not None and {*rig.columns} <= {*logged.columns(first)}
     except ValueError:
@@ -76,21 +72,27 @@ def read(rig: Rig, path: Path) -> Recording:
     for name, values in zip(rig.columns, (log.t, *log.y.T, log.u), strict=True):
         if not np.isfinite(values).all():
             raise ValueError(f"{path}: {name} of sample {int(np.argmin(np.isfinite(values)))} is not finite")
-    steps = np.diff(log.t)
-    if (steps <= 0.0).any():
-        k = int(np.argmax(steps <= 0.0)) + 1
-        raise ValueError(f"{path}: time runs backwards at sample {k}: {log.t[k]!r} after {log.t[k - 1]!r}")
     angle, fault = rig.corrected(log.y[:, 1])
-    return Recording(
-        path.stem, _regular(steps, rig.period), np.column_stack([log.y[:, 0], angle]), _late(log.u, rig.delay), fault
-    )
+    try:
+        t = _regular(log.t, rig.period)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
+    return Recording(path.stem, t, np.column_stack([log.y[:, 0], angle]), _late(log.u, rig.delay), fault)
 
 
-def _regular(steps: Array, period: float) -> Array:
+def _regular(stamps: Array, period: float) -> Array:
     """Times on a grid: the sampling is regular, the stamps jitter with the computer that wrote them."""
-    usual = float(np.median(steps))
+    apart = np.diff(stamps)
+    usual = float(np.median(apart))
+    if (apart <= 0.0).any():
+        k = int(np.argmax(apart <= 0.0)) + 1
+        raise ValueError(f"time runs backwards at sample {k}: {stamps[k]:.15g} after {stamps[k - 1]:.15g}")
     period = period if abs(usual - period) < _SAME * period else usual
-    return np.concatenate([[0.0], np.cumsum(period * np.maximum(np.round(steps / period), 1.0))])
+    steps = np.round(apart / period)
+    if (steps < 1.0).any():
+        k = int(np.argmax(steps < 1.0)) + 1
+        raise ValueError(f"sample {k} comes {apart[k - 1]:.4g} s after the one before, where {period:.4g} s are usual")
+    return np.concatenate([[0.0], np.cumsum(steps)]) * period
 
 
 def _late(u: Array, delay: float) -> Array:
@@ -100,22 +102,10 @@ def _late(u: Array, delay: float) -> Array:
     return np.asarray((1.0 - rest) * padded[1 : len(u) + 1] + rest * padded[: len(u)])
 
 
+def _files(place: Path) -> list[Path]:
+    return sorted((path for path in place.glob("*.csv") if path.name != INDEX), key=_order)
+
+
 def _order(path: Path) -> tuple[int, str]:
     number = re.findall(r"\d+", path.stem)
     return (int(number[-1]) if number else 0, path.name)
-
-
-@cache
-def _index(folder: Path) -> Mapping[str, str]:
-    path = folder / INDEX
-    if not path.is_file():
-        return {}
-    with path.open(encoding="utf-8", newline="") as file:
-        return {row["file"]: row["sha256"] for row in csv.DictReader(file)}
-
-
-def _check(path: Path, known: str | None) -> None:
-    if known is not None and (found := hashlib.sha256(path.read_bytes()).hexdigest()) != known:
-        raise ValueError(
-            f"{path}: is not the file that {INDEX} names (its SHA-256 is {found}, not {known}): nothing is used"
-        )

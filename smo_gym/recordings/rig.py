@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from ..models import Model
@@ -23,6 +23,11 @@ class Recording:
     fault: Flags
     """Samples at which the sensor of the second position says nothing, (samples,)."""
 
+    def between(self, first: float, last: float) -> Recording:
+        """The samples from one time on to before another, in s."""
+        kept = (self.t >= first) & (self.t < last)
+        return Recording(self.name, self.t[kept], self.y[kept], self.u[kept], self.fault[kept])
+
 
 @dataclass(frozen=True, slots=True)
 class Rig:
@@ -35,8 +40,12 @@ class Rig:
     model: Model
     period: float
     """Sampling period in s."""
+    numbers: tuple[str, ...]
+    """Names of the model's numbers, as its equations have them."""
+    quanta: tuple[float, float]
+    """Steps of the measured positions."""
     noise: tuple[float, float]
-    """Standard deviations of the positions."""
+    """Standard deviations of the positions, quantisation included."""
     acceleration: tuple[float, float]
     """Process noise: accelerations per root Hz, the first along the input."""
     columns: tuple[str, str, str, str]
@@ -55,6 +64,12 @@ class Rig:
     """Jerks per root Hz that the model-free smoother grants."""
     parts: Mapping[str, tuple[int, ...]]
     """Which of the model's numbers grow with the motor's gain and with the inverse of the pendulum's length."""
+    held: tuple[str, ...] = ()
+    """What is not fitted, as :func:`.fitting.fit` names it, because recordings do not tell it."""
+
+    def of(self, params: Sequence[float]) -> Rig:
+        """The rig with other numbers of its model."""
+        return replace(self, model=replace(self.model, params=tuple(params)))
 
     def mistaken(self, **factors: float) -> Model:
         """The model with a motor gain, or an inverse length, that is wrong by some factors."""
@@ -62,4 +77,4 @@ class Rig:
         for part, factor in factors.items():
             for index in self.parts[part]:
                 numbers[index] *= factor
-        return replace(self.model, params=tuple(numbers))
+        return self.of(numbers).model

@@ -96,13 +96,11 @@ def score(
     e, slope, total, n = np.concatenate(errors), np.concatenate(slopes), np.array(squares), np.array(counts)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         each = np.sqrt(np.where(n > 0, total / np.maximum(n, 1), np.nan))
-        picked = np.random.default_rng(SEED).integers(0, len(n), (RESAMPLED, len(n)))
-        resampled = np.sqrt(total[picked].sum(1) / np.maximum(n[picked].sum(1), 1))
-        low, high = np.quantile(resampled, [0.5 - 0.5 * SHARE, 0.5 + 0.5 * SHARE])
+        low, high = _interval(_resampled(total, n))
         return Score(
             rmse=float(np.sqrt(total.sum() / n.sum())),
-            ci_low=float(low),
-            ci_high=float(high),
+            ci_low=low,
+            ci_high=high,
             lag=float(-(e * slope).sum() / (slope**2).sum()),
             total_variation=variation / seconds,
             largest=float(np.abs(e).max()),
@@ -111,3 +109,36 @@ def score(
             fault_largest=float(np.max(peaks)) if peaks else np.nan,
             lost=int((~(each[n > 0] < rig.lost)).sum()),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What one observer's error is above another's, run beside run."""
+
+    value: float
+    ci_low: float
+    ci_high: float
+    """The 95 % interval, from runs that are resampled for both alike."""
+    better: int
+    """Runs in which the first has the smaller error."""
+    runs: int
+
+
+def difference(rig: Rig, recordings: Sequence[Recording], first: Score, second: Score) -> Difference:
+    """The difference of two root mean square errors, from scores of one velocity of the same runs."""
+    n = np.array([scored(rig, recording).sum() for recording in recordings])
+    a, b = (np.where(n > 0, each**2 * n, 0.0) for each in (first.each, second.each))
+    low, high = _interval(_resampled(a, n) - _resampled(b, n))
+    better = int((first.each < second.each).sum())
+    return Difference(first.rmse - second.rmse, low, high, better, int((n > 0).sum()))
+
+
+def _resampled(squares: Array, counts: Array) -> Array:
+    """Root mean square errors of runs drawn with replacement, the same runs whatever the errors."""
+    picked = np.random.default_rng(SEED).integers(0, len(counts), (RESAMPLED, len(counts)))
+    return np.asarray(np.sqrt(squares[picked].sum(1) / np.maximum(counts[picked].sum(1), 1)))
+
+
+def _interval(values: Array) -> tuple[float, float]:
+    low, high = np.quantile(values, [0.5 - 0.5 * SHARE, 0.5 + 0.5 * SHARE])
+    return float(low), float(high)

@@ -16,6 +16,7 @@ NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SHORTER = {
     "03-learning": {"steps = 120_000": "steps = 12_800", "runs = 200": "runs = 20"}
 }  # all cells run, for less long
+REAL, WHERE, DATA = "05-a-real-pendulum", "SMO_GYM_DATA", ROOT.parent / "shared" / "data"
 LIMIT = 400_000  # bytes
 
 
@@ -40,8 +41,16 @@ def told(notebook):
             yield output.get("text") or data.get("text/markdown") or ("image/png" in data)
 
 
-def test_there_are_four():
-    names = ["01-the-article", "02-the-observer", "03-learning", "04-what-an-encoder-does"]
+@pytest.fixture(autouse=True)
+def recordings(monkeypatch):
+    """Those beside this checkout, where there are some."""
+    monkeypatch.delenv(WHERE, raising=False)
+    if DATA.is_dir():
+        monkeypatch.setenv(WHERE, str(DATA))
+
+
+def test_there_are_five():
+    names = ["01-the-article", "02-the-observer", "03-learning", "04-what-an-encoder-does", REAL]
     assert [path.stem for path in NOTEBOOKS] == names
 
 
@@ -56,7 +65,7 @@ def test_notebook_runs(path):
         cell.source = cell.source.replace(long, short)
     committed = list(told(notebook))
     run_through(notebook)
-    if path.stem in SHORTER:
+    if path.stem in SHORTER or (path.stem == REAL and not DATA.is_dir()):
         assert len(list(told(notebook))) == len(committed)
     else:
         assert list(told(notebook)) == committed
@@ -76,6 +85,19 @@ def test_notebook_is_committed_as_executed(path):
     assert len(shown) > 1
     for cell, _ in shown:
         assert len(cell.metadata.alt) > 30
+
+
+@pytest.mark.slow
+def test_a_twin_stands_in_for_the_recordings_of_the_real_pendulum(monkeypatch):
+    monkeypatch.delenv(WHERE, raising=False)
+    notebook = read(FOLDER / f"{REAL}.ipynb")
+    committed = list(told(notebook))
+    assert committed[0].startswith("30 recordings of the real cart pole")
+    assert str(DATA) not in "".join(map(str, committed))
+    run_through(notebook)
+    instead = list(told(notebook))
+    assert instead[0].startswith(f"{WHERE} is not set: 30 runs of a synthetic twin")
+    assert len(instead) == len(committed)
 
 
 def test_a_failing_cell_is_named():

@@ -4,6 +4,7 @@ import pytest
 from conftest import SMALL
 
 from smo_gym.evaluation import scenario
+from smo_gym.wrappers import VectorObserverWrapper
 
 
 @pytest.mark.parametrize(
@@ -38,3 +39,23 @@ def test_bad_scenarios_are_named(tmp_path, change, message):
 def test_a_missing_scenario_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"none\.yaml: cannot be read \(No such file or directory\)"):
         scenario.load(tmp_path / "none.yaml")
+
+
+def test_an_observer_may_start_at_what_is_measured(tmp_path):
+    path = tmp_path / "measured.yaml"
+    zero = "xhat0: {value: [0, 0, 0, 0]"
+    assert zero in SMALL.read_text()
+    path.write_text(SMALL.read_text().replace(zero, "xhat0: {value: measured"))
+    place = scenario.load(path)
+    (x0,) = place.initial_states.value.values()
+    (settings,) = place.controllers.values()
+    env = VectorObserverWrapper(place.make(), settings.observer.build(compensation=True))
+    observation, _ = env.reset(options={"state": [x0]})
+    assert observation[0, -4:].tolist() == [*x0[:2], 0.0, 0.0]
+
+
+def test_a_start_of_an_observer_is_a_state_or_the_word(tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text(SMALL.read_text().replace("xhat0: {value: [0, 0, 0, 0]", "xhat0: {value: measurd"))
+    with pytest.raises(ValueError, match=r"xhat0.*'measured' \(given 'measurd'\)"):
+        scenario.load(path)

@@ -144,6 +144,11 @@ def test_scores_by_their_definitions(twin):
     assert score.rmse == pytest.approx(np.sqrt((e**2).mean()))
     assert score.ci_low == pytest.approx(score.ci_high)  # three equal runs
     assert score.fault_median == pytest.approx(np.abs((late[0] - x[:, 2:])[98:106, 1]).max())
+    half = [x[:, 2:] + 0.5 * (late[0] - x[:, 2:])]
+    nearer = scoring.score(CART_POLE, [recording] * 3, half * 3, [x[:, 2:]] * 3, 1)
+    beside = scoring.difference(CART_POLE, [recording] * 3, nearer, score)
+    assert (beside.value, beside.ci_low, beside.ci_high) == pytest.approx([-0.5 * score.rmse] * 3)
+    assert (beside.better, beside.runs) == (3, 3)
     lost = scoring.score(CART_POLE, [recording], [x[:, 2:] + 1.0], [x[:, 2:]], 1)
     assert lost.lost == 1
 
