@@ -10,7 +10,7 @@ from conftest import ROOT
 import smo_gym
 from smo_gym.cli.arguments import versions
 
-EXTRAS = ("rl", "render", "plots", "report", "reference", "dask", "recordings")
+EXTRAS = ("rl", "render", "plots", "report", "reference", "mpc", "dask", "recordings")
 
 
 def test_the_lowest_versions_that_are_tried_are_the_lowest_that_are_allowed():

@@ -12,14 +12,16 @@ from ..validation import choice, number, switch
 
 SIGN, LAYER, SUPER_TWISTING, PI = "sign", "layer", "super-twisting", "pi"
 KINDS = (SIGN, LAYER, SUPER_TWISTING, PI)
-SCHEMES = ("implicit", "explicit")
+IMPLICIT, PREDICTING, EXPLICIT = "implicit", "predicting", "explicit"
+SCHEMES = (IMPLICIT, PREDICTING, EXPLICIT)
 _REACHES: dict[tuple[str, str], Reach] = {
-    (SIGN, "implicit"): kernels.sign_implicit,
-    (SIGN, "explicit"): kernels.sign_explicit,
-    (LAYER, "implicit"): kernels.layer,
-    (SUPER_TWISTING, "implicit"): kernels.twisting_implicit,
-    (SUPER_TWISTING, "explicit"): kernels.twisting_explicit,
-    (PI, "implicit"): kernels.proportional_integral,
+    (SIGN, IMPLICIT): kernels.sign_implicit,
+    (SIGN, EXPLICIT): kernels.sign_explicit,
+    (LAYER, IMPLICIT): kernels.layer,
+    (SUPER_TWISTING, IMPLICIT): kernels.twisting_implicit,
+    (SUPER_TWISTING, PREDICTING): kernels.twisting_predicting,
+    (SUPER_TWISTING, EXPLICIT): kernels.twisting_explicit,
+    (PI, IMPLICIT): kernels.proportional_integral,
 }
 
 
@@ -48,12 +50,15 @@ class Reaching:
     - ``pi``, ``v = -k1 sigma + z, z' = -k2 sigma``, the linear rival: to 0 where d is constant, else to the order of
       ``|d'| / k2``.
 
-    Explicit steps are Euler's. Implicit ones take sgn at the step's end, where the set-valued sgn is a projection: no
-    gain makes them chatter. How: D, the integral of d, is what sigma would be without v, and v takes off what D will be
-    a step ahead. Super-twisting is Levant's differentiator of D: by an implicit step of h (Acary and Brogliato 2010) it
-    predicts D to the order of h^2, and once it has converged ``sigma_{k+1} = h (d_k - d_{k-1})``. (The implicit step of
-    Brogliato, Polyakov and Efimov, IEEE Trans. Automatic Control 65, 2020, lets sigma + h v vanish without a
-    prediction of d, and leaves ``h d_k``.) ``sign`` and ``layer`` have no integral that could predict.
+    Explicit steps are Euler's. Implicit ones take sgn at the step's end, where the set-valued sgn is a projection, so
+    that no gain makes them chatter (Brogliato, Polyakov and Efimov, The implicit discretization of the super-twisting
+    sliding-mode control algorithm, IEEE Trans. Automatic Control 65, 2020). They let sigma + h v vanish, without a
+    guess of d, and leave ``sigma_{k+1} = h d_k``.
+
+    "predicting" is ours and guesses d by -z. D, the integral of d, is what sigma would be without v; super-twisting is
+    Levant's differentiator of D, whose implicit step (Acary and Brogliato 2010) predicts D to the order of h^2, and v
+    takes that prediction off: once it has converged ``sigma_{k+1} = h (d_k - d_{k-1})``. It is more accurate, and
+    twice as steep near 0: noise of sigma moves it more.
 
     ``conditioned`` keeps z from running away while the actuator is at its limit: then ``z' = k2 sgn(v_acts - z)``, with
     the rate that acts (Seeber and Reichhartinger, Conditioned super-twisting algorithm for systems with saturated
@@ -63,7 +68,7 @@ class Reaching:
         kind: one of the table.
         k1: first gain.
         k2: second gain; ``sign`` has none.
-        scheme: "implicit" or "explicit".
+        scheme: "implicit" or "explicit"; of super-twisting also "predicting".
         conditioned: what becomes of z at the limit.
         L: bound of ``|d'|`` that super-twisting is meant for, of ``|d|`` that the others are; where the gains break a
             condition for it, that is warned of.
@@ -75,7 +80,7 @@ class Reaching:
     kind: str = SUPER_TWISTING
     k1: float = 1.5
     k2: float = 1.1
-    scheme: str = "implicit"
+    scheme: str = IMPLICIT
     conditioned: bool = True
     L: float | None = None
 
@@ -83,7 +88,8 @@ class Reaching:
         choice("kind of reaching law", self.kind, KINDS)
         choice("scheme", self.scheme, SCHEMES)
         if (self.kind, self.scheme) not in _REACHES:
-            raise ValueError(f"scheme={self.scheme!r} is of sign and super-twisting alone, {self.kind!r} is 'implicit'")
+            schemes = " or ".join(repr(scheme) for kind, scheme in _REACHES if kind == self.kind)
+            raise ValueError(f"scheme={self.scheme!r} of a reaching law of the kind {self.kind!r} must be {schemes}")
         for name in ("k1", "k2"):
             object.__setattr__(self, name, number(name, getattr(self, name), above=0.0))
         switch("conditioned", self.conditioned)
@@ -97,7 +103,7 @@ class Reaching:
                 )
 
     @classmethod
-    def super_twisting(cls, L: float, scheme: str = "implicit", conditioned: bool = True) -> Reaching:
+    def super_twisting(cls, L: float, scheme: str = IMPLICIT, conditioned: bool = True) -> Reaching:
         """Super-twisting for ``|d'| < L`` with Levant's gains, k1 = 1.5 sqrt L and k2 = 1.1 L.
 
         Raises:

@@ -32,13 +32,13 @@ _VARIATION = 100.0
 def of_law(laws: Laws, name: str, family: str) -> Callable[[Tree], float]:
     """The objective of a law in a family, of its numbers.
 
-    ``mse_h / a + mse_theta / b + w ln(TV / 100 N) + 20 (share of runs that fail)``, means over training plants that did
-    not fail, with the family's scales (a, b) and the settings' w.
+    ``((mse_h / a)^p + (mse_theta / b)^p)^(1/p) + w ln(TV / 100 N) + 20 (share of runs that fail)``, means over training
+    plants that did not fail, with the family's scales (a, b), norm p and smoothness w.
     """
     place = TRAINING[family]
     place = replace(place, estimate=laws[name].estimate or place.estimate, period=laws[name].period or place.period)
     settings = laws.families[family]
-    (a, b), weight = settings.scales, settings.smoothness
+    (a, b), p, weight = settings.scales, settings.norm, settings.smoothness
 
     def cost(tuned: Tree) -> float:
         found = run(place, laws.of(name, family, tuned), settings.runs, SEED)
@@ -47,6 +47,6 @@ def of_law(laws: Laws, name: str, family: str) -> Callable[[Tree], float]:
             return 10.0 * FALL
         h, theta, variation = (float(found[key][stood].mean()) for key in ("mse_h", "mse_theta", "total_variation"))
         smooth = weight * math.log(max(variation, 1e-9) / _VARIATION)
-        return h / a + theta / b + smooth + FALL * float(1.0 - stood.mean())
+        return ((h / a) ** p + (theta / b) ** p) ** (1.0 / p) + smooth + FALL * float(1.0 - stood.mean())
 
     return cost

@@ -111,7 +111,7 @@ def promise(L: float, runs: int, seed: int) -> Promise:
     plants = np.array([nominal.perturbed(LEVEL * draw).as_array() for draw in deviations(seed, runs)])
     starts = np.array([np.random.default_rng([seed, each, 2]).uniform(case.low, case.high) for each in range(runs)])
     watch = _Watch(plants, K, nominal)
-    law = IntegralSlidingMode(Linear(K, PERIOD), PERIOD, Reaching.super_twisting(L), LIMIT, nominal)
+    law = IntegralSlidingMode(Linear(K, PERIOD), PERIOD, Reaching.super_twisting(L, "predicting"), LIMIT, nominal)
     reset = {"state": starts, "params": plants, "noise": np.array(noise(seed, runs))}
     rollout(VectorObserverWrapper(env, Oracle()), law, options=reset, recorders=[watch])
     return Promise(L, watch.steepest, watch.free, watch.least_gain, watch.largest)

@@ -84,6 +84,8 @@ class Family(Strict):
 
     scales: tuple[float, float]
     """Mean squares of h in m^2 and of theta in rad^2 that count as 1."""
+    norm: Annotated[float, Field(ge=1.0)] = 4.0
+    """In which both are taken together: of a large one the larger counts."""
     smoothness: float = 0.1
     """Weight of the logarithm of the total variation."""
     runs: Annotated[int, Field(ge=1)] = 16

@@ -37,22 +37,33 @@ def twisting_explicit(sigma: float, z: float, h: float, k_1: float, k_2: float) 
 
 
 @inlined
-def twisting_implicit(sigma: float, z: float, h: float, k_1: float, k_2: float) -> tuple[float, float]:
-    """The same, implicit in what is not known: see :class:`~smo_gym.controllers.reaching.Reaching`.
-
-    ``|sigma| = s^2 + h k_1 s + h^2 k_2 |xi|`` with xi in Sgn sigma.
-    """
+def _solved(b: float, h: float, k_1: float, k_2: float) -> tuple[float, float]:
+    """``k_1 s sgn b`` and ``h k_2 xi`` with xi in Sgn b, so that ``|b| = s^2 + h k_1 s + h^2 k_2 |xi|``."""
     least = h * h * k_2
-    push = h * k_2 * clipped(sigma / least)
-    rest = max(abs(sigma) - least, 0.0)
+    rest = max(abs(b) - least, 0.0)
     root = 0.5 * (math.sqrt(h * h * k_1 * k_1 + 4.0 * rest) - h * k_1)
+    return k_1 * root * sign(b), h * k_2 * clipped(b / least)
+
+
+@inlined
+def twisting_implicit(sigma: float, z: float, h: float, k_1: float, k_2: float) -> tuple[float, float]:
+    """The same with sigma at the step's end on the right-hand side, as if d were 0: ``sigma+ = sigma + h v``."""
+    root, push = _solved(sigma + h * z, h, k_1, k_2)
     z -= push
-    return -k_1 * root * sign(sigma) + z - push, z
+    return z - root, z
+
+
+@inlined
+def twisting_predicting(sigma: float, z: float, h: float, k_1: float, k_2: float) -> tuple[float, float]:
+    """The same with -z for d: see :class:`~smo_gym.controllers.reaching.Reaching`."""
+    root, push = _solved(sigma, h, k_1, k_2)
+    z -= push
+    return z - root - push, z
 
 
 @inlined
 def proportional_integral(sigma: float, z: float, h: float, k_1: float, k_2: float) -> tuple[float, float]:
-    """``v = -k_1 sigma + z``, ``z' = -k_2 sigma``, in the same way."""
+    """``v = -k_1 sigma + z``, ``z' = -k_2 sigma``, as the predicting step above."""
     after = sigma / (1.0 + h * k_1 + h * h * k_2)
     push = h * k_2 * after
     z -= push

@@ -22,7 +22,9 @@ def follow(law, sigma, seconds, d=lambda t: 0.0, h=STEP):
     return np.array(found)
 
 
-@pytest.mark.parametrize("law", [Reaching.super_twisting(4.0), Reaching("sign", 2.0)])
+@pytest.mark.parametrize(
+    "law", [Reaching.super_twisting(4.0), Reaching.super_twisting(4.0, "predicting"), Reaching("sign", 2.0)]
+)
 def test_implicit_steps_reach_zero_and_stay_there(law):
     """Within rounding, and the rate is then none: no chatter; Euler's explicit steps never settle."""
     sigma, v = follow(law, 1.0, 5.0).T
@@ -44,7 +46,7 @@ def test_gains_ten_times_as_large_do_not_make_implicit_steps_chatter():
     assert variations == pytest.approx([own, own], rel=0.05)
 
 
-@pytest.mark.parametrize("scheme", ["implicit", "explicit"])
+@pytest.mark.parametrize("scheme", ["implicit", "predicting", "explicit"])
 def test_small_steps_follow_the_differential_equation(scheme):
     """Before sigma reaches 0, where right-hand sides are smooth; an adaptive solver of order 8 is the judge."""
     law = Reaching(k1=1.5, k2=1.1, scheme=scheme)
@@ -73,11 +75,18 @@ def test_a_boundary_layer_leaves_what_its_width_says():
 
 @pytest.mark.parametrize("L", [0.5, 2.0, 40.0])
 def test_levants_gains_meet_the_conditions_and_stand_the_disturbance(L):
-    """d' = L sgn of a square wave, the worst there is: sigma is what d changes by in a step, h (d_k - d_{k-1})."""
-    law = Reaching.super_twisting(L)
-    assert all(each.holds for each in law.conditions(L))
-    sigma, _ = follow(law, 0.0, 10.0, d=lambda t: L * (0.5 - abs((t % 2.0) - 1.0))).T
-    assert np.abs(sigma[300:]).max() == pytest.approx(L * STEP**2)
+    """d' = L sgn of a square wave, the worst there is: h d_k is left, or h (d_k - d_{k-1}) where d is predicted."""
+
+    def triangle(t):
+        return L * (0.5 - abs((t % 2.0) - 1.0))
+
+    assert all(each.holds for each in Reaching.super_twisting(L).conditions(L))
+    implicit, predicting = (
+        np.abs(follow(Reaching.super_twisting(L, scheme), 0.0, 10.0, d=triangle)[300:, 0]).max()
+        for scheme in ("implicit", "predicting")
+    )
+    assert implicit == pytest.approx(STEP * 0.5 * L, rel=0.02)
+    assert predicting == pytest.approx(STEP**2 * L)
 
 
 def test_a_disturbance_faster_than_k2_carries_sigma_away():
@@ -125,7 +134,11 @@ def test_conditioned_integral_goes_to_what_acts():
     [
         ({"kind": "magic"}, "kind of reaching law"),
         ({"scheme": "proper"}, "scheme"),
-        ({"kind": "pi", "scheme": "explicit"}, "scheme='explicit' is of sign and super-twisting alone"),
+        ({"kind": "layer", "scheme": "predicting"}, "must be 'implicit'"),
+        (
+            {"kind": "pi", "scheme": "explicit"},
+            "scheme='explicit' of a reaching law of the kind 'pi' must be 'implicit'",
+        ),
         ({"k1": 0.0}, "k1"),
         ({"k2": math.nan}, "k2"),
         ({"L": -1.0}, "L"),
