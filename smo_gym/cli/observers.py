@@ -178,13 +178,15 @@ def _page(
     drawn = {observing.EXACT, observing.NOISE} <= {*args.sensor}
     settings = {
         **observing.place(observing.EXACT).model_dump(mode="json", include=PLACE),
-        "sensor": {name: observing.SENSORS[name] for name in args.sensor},
+        "sensor": {
+            name: {"value": observing.SENSORS[name] or "none", "source": "chosen", "note": ""} for name in args.sensor
+        },
         **candidates.told(observers),
     }
     return observer_page.render(
         "Observers on simulated encoders",
-        f"{args.runs} random plants, uncertain by {level:.0%}, seed {args.seed}; {RESULTS[0]} has the smaller levels "
-        f"too. In the open loop {observing.LAW.upper()} acts on the true state, and all observers see the same "
+        f"{args.runs} random plants, uncertain by {100 * level:g} %, seed {args.seed}; {RESULTS[0]} has the smaller "
+        f"levels too. In the open loop {observing.LAW.upper()} acts on the true state, and all observers see the same "
         "trajectories; in the closed loop it acts on the observer's estimate. Errors are of the last "
         f"{observing.HORIZON - velocity_errors.SETTLED:g} of {observing.HORIZON:g} s, in runs that did not fail; "
         "those that did are counted beside.",

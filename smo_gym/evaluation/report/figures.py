@@ -232,12 +232,12 @@ def _bars(plan: Plan, outcomes: Iterable[Outcome], results: Iterable[Result]) ->
 
 
 def encode(figure: Figure, form: str) -> bytes:
-    """A figure as the bytes of a file, of :data:`FORMATS` or svg; the same figure gives the same bytes."""
+    """A figure as the bytes of a file, of :data:`FORMATS` or svg, which has no ground; the same bytes each time."""
     from matplotlib import rc_context
 
     file = io.BytesIO()
     with rc_context(STYLE):
-        figure.savefig(file, format=form, metadata=_UNSAID.get(form))
+        figure.savefig(file, format=form, metadata=_UNSAID.get(form), transparent=form == "svg")
     return _small(file) if form == "png" else file.getvalue()
 
 
