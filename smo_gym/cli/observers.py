@@ -48,7 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.runs(200, "random plants at each level of uncertainty")
     parser.seed("the random plants and noise")
     parser.add_argument("--figure", action="store_true", help="draw it, as PDF and PNG into DIR")
-    parser.add_argument("--report", action="store_true", help=f"write tables to sort, and it, into DIR/{real.PAGE}")
+    parser.add_argument(
+        "--report", action="store_true", help=f"write tables that sort and the picture into DIR/{real.PAGE}"
+    )
     parser.add_argument("--mismatch", action="store_true", help="with --data: wrong models, all observers tuned again")
     parser.out("observers")
     computing.add(parser)

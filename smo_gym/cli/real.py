@@ -27,9 +27,9 @@ RESULTS = ("real.csv", "lost.csv", "mismatch.csv", "real.md")
 FIGURE = "fault"
 PAGE = "observers.html"
 TOLD = (
-    "Each observer runs through the test recordings, which its numbers were not tuned on. There is no true velocity "
-    "to compare with: the reference is that of a smoother, which sees the whole recording, and of which the errors "
-    "are RMS. Nothing is random. ns is the time for a sample."
+    "Each observer runs through the test recordings, which its numbers were not tuned on. No true velocity is "
+    "known: errors are told against that of a smoother, which sees the whole recording. Nothing is random but the "
+    "resampling of runs for the intervals, whose seed is fixed. ns is the time for a sample."
 )
 CAPTION = "A passage of the sensor's fault: what it reads, and how far off the speed of some observers is meanwhile."
 SMO = "smo"

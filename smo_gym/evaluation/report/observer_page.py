@@ -85,7 +85,7 @@ def _shown(table: Table) -> dict[str, Any]:
     heading, _, note = typeset(table.title).partition(": ")
     return {
         "heading": heading,
-        "note": note,
+        "note": note[:1].upper() + note[1:],
         "header": [*map(typeset, table.header)],
         "rows": [[typeset(str(cell)) for cell in row] for row in table.rows],
     }
