@@ -13,19 +13,21 @@ from collections.abc import Sequence
 from dataclasses import astuple, fields
 from pathlib import Path
 
-from tabulate import tabulate
 from tqdm import tqdm
 
 from .. import files
-from ..evaluation import candidates, formats, observing, robustness
+from ..evaluation import candidates, formats, observing, robustness, velocity_errors
 from ..evaluation.observing import Row
-from ..evaluation.report import figures, observer_panels
+from ..evaluation.report import figures, observer_page, observer_panels
+from ..evaluation.report.observer_page import Origin, Table
 from ..evaluation.store import FOLDER, Store
 from ..evaluation.study import simulated_seconds
 from . import computing, real
-from .arguments import Parser, one_of, several
-from .entry import command
+from .arguments import Parser, one_of, several, versions
+from .entry import command, typed
 
+PLACE = {"environment", "horizon", "force_limit", "track_limit", "control_period", "uncertainty", "initial_states"}
+"""Settings of the scenario that a page tells."""
 RESULTS = ("observers.csv", "observers.md")
 FIGURE = "observers"
 
@@ -46,13 +48,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.runs(200, "random plants at each level of uncertainty")
     parser.seed("the random plants and noise")
     parser.add_argument("--figure", action="store_true", help="draw it, as PDF and PNG into DIR")
+    parser.add_argument(
+        "--report", action="store_true", help=f"write tables that sort and the picture into DIR/{real.PAGE}"
+    )
     parser.add_argument("--mismatch", action="store_true", help="with --data: wrong models, all observers tuned again")
     parser.out("observers")
     computing.add(parser)
     args = parser.parse_args(arguments)
     if args.mismatch and args.data is None:
         raise ValueError("--mismatch is of recordings: give their folder with --data")
-    return _simulated(args) if args.data is None else real.measure(args)
+    if args.report:
+        observer_page.check()
+    line = typed("observers", arguments)
+    return _simulated(args, line) if args.data is None else real.measure(args, line)
 
 
 def chosen(known: candidates.Candidates, names: Sequence[str] | None) -> dict[str, candidates.Candidate]:
@@ -64,12 +72,12 @@ def chosen(known: candidates.Candidates, names: Sequence[str] | None) -> dict[st
     return {name: known[name] for name in names or known.observers}
 
 
-def _simulated(args: argparse.Namespace) -> int:
+def _simulated(args: argparse.Namespace, line: str) -> int:
     observers = chosen(candidates.named("simulated"), args.observer)
     drawings = [f"{FIGURE}.{form}" for form in figures.FORMATS] if args.figure else []
     groups = observing.wanted([*observers], args.sensor, observing.LEVELS, args.runs)
     with (
-        files.claimed(args.out, (*RESULTS, *drawings)) as out,
+        files.claimed(args.out, (*RESULTS, real.PAGE, *drawings)) as out,
         computing.computing(args, out) as measure,
         robustness.late_errors(),
     ):
@@ -94,15 +102,17 @@ def _simulated(args: argparse.Namespace) -> int:
         speed = {name: observing.nanoseconds(candidate) for name, candidate in observers.items()}
         made: dict[str, str | bytes] = {
             RESULTS[0]: _csv(rows, speed),
-            RESULTS[1]: "\n\n".join(_tables(rows, speed, "github")) + "\n",
+            RESULTS[1]: observer_page.text(_tables(rows, speed), "github") + "\n",
         }
         if args.figure:
             figure = observer_panels.draw(rows, [*observers], observing.LEVELS[-1])
             made |= {f"{FIGURE}.{form}": figures.encode(figure, form) for form in figures.FORMATS}
+        if args.report:
+            made[real.PAGE] = _page(args, observers, rows, speed, line)
         try:
-            files.write_set(out, made)
+            files.write_set(out, made, [real.PAGE])
         finally:  # what cannot be written can be read at least
-            print("\n\n".join(_tables(rows, speed, "simple")))
+            print(observer_page.text(_tables(rows, speed), "simple"))
     print(f"\nresults are in {args.out}")
     return 0
 
@@ -112,31 +122,77 @@ def _csv(rows: Sequence[Row], speed: dict[str, float]) -> str:
     return formats.as_csv(header, [(*astuple(row), speed[row.observer]) for row in rows])
 
 
-def _tables(rows: Sequence[Row], speed: dict[str, float], form: str) -> list[str]:
-    """A table for each loop at the largest level: an observer a line, a sensor a column."""
+def _tables(rows: Sequence[Row], speed: dict[str, float]) -> list[Table]:
+    """A table for each loop at the largest level."""
     level = max(row.uncertainty for row in rows)
-    found = []
-    for loop, title in (
-        ("open", "on the same trajectories: RMS errors of h' in m/s and theta' in rad/s after 2 s"),
-        ("closed", f"each in the loop of {observing.LAW.upper()}: the same, and runs that failed"),
-    ):
-        mine = [row for row in rows if (row.loop, row.uncertainty) == (loop, level)]
-        sensors = list(dict.fromkeys(row.sensor for row in mine))
-        lines = [
-            (
-                name,
-                *(_cell([row for row in mine if (row.observer, row.sensor) == (name, s)]) for s in sensors),
-                f"{speed[name]:.0f}",
-            )
-            for name in dict.fromkeys(row.observer for row in mine)
-        ]
-        header = ("observer", *sensors, "ns")
-        told = tabulate(lines, header, form, disable_numparse=True)
-        found.append(f"Plants uncertain by {level:.0%}, {title}\n\n{told}")
-    return found
+    return [
+        _table(
+            f"Plants uncertain by {level:.0%}, {title}",
+            [row for row in rows if (row.loop, row.uncertainty) == (loop, level)],
+            speed,
+        )
+        for loop, title in (
+            ("open", "on the same trajectories: RMS errors of h' in m/s and theta' in rad/s after 2 s"),
+            ("closed", f"each in the loop of {observing.LAW.upper()}: the same, and runs that failed"),
+        )
+    ]
+
+
+def _table(title: str, rows: Sequence[Row], speed: dict[str, float]) -> Table:
+    """An observer a line, a sensor a column."""
+    sensors = list(dict.fromkeys(row.sensor for row in rows))
+    lines = [
+        (
+            name,
+            *(_cell([row for row in rows if (row.observer, row.sensor) == (name, s)]) for s in sensors),
+            f"{speed[name]:.0f}",
+        )
+        for name in dict.fromkeys(row.observer for row in rows)
+    ]
+    return Table(title, ("observer", *sensors, "ns"), lines)
 
 
 def _cell(rows: Sequence[Row]) -> str:
-    """Both velocities' errors, and how many runs failed where some did."""
+    """Errors of the velocities, and how many runs failed where some did."""
     errors = " / ".join(f"{row.rmse:.2g}" for row in rows)
     return errors + (f" ({rows[0].failed} lost)" if rows[0].failed else "")
+
+
+def _page(
+    args: argparse.Namespace,
+    observers: dict[str, candidates.Candidate],
+    rows: Sequence[Row],
+    speed: dict[str, float],
+    line: str,
+) -> str:
+    """The tables, of each velocity one, so that all numbers sort; and the picture, which needs both of its sensors."""
+    level = observing.LEVELS[-1]
+    tables = [
+        _table(
+            f"{where}, {title}: RMS error in {unit} behind each sensor; ns: time for a slot and sample",
+            [row for row in rows if (row.loop, row.channel, row.uncertainty) == (loop, channel, level)],
+            speed,
+        )
+        for loop, where in (("open", "Open loop"), ("closed", "Closed loop"))
+        for (channel, title), unit in zip(observer_panels.TITLES.items(), ("m/s", "rad/s"), strict=True)
+    ]
+    caption = "What noise adds to each velocity against its lag, in the open loop. Blue: none is better in both."
+    drawn = {observing.EXACT, observing.NOISE} <= {*args.sensor}
+    settings = {
+        **observing.place(observing.EXACT).model_dump(mode="json", include=PLACE),
+        "sensor": {
+            name: {"value": observing.SENSORS[name] or "none", "source": "chosen", "note": ""} for name in args.sensor
+        },
+        **candidates.told(observers),
+    }
+    return observer_page.render(
+        "Observers on simulated encoders",
+        f"{args.runs} random plants, uncertain by {100 * level:g} %, seed {args.seed}; {RESULTS[0]} has the smaller "
+        f"levels too. In the open loop {observing.LAW.upper()} acts on the true state, and all observers see the same "
+        "trajectories; in the closed loop it acts on the observer's estimate. Errors are of the last "
+        f"{observing.HORIZON - velocity_errors.SETTLED:g} of {observing.HORIZON:g} s, in runs that did not fail; "
+        "those that did are counted beside.",
+        tables,
+        {caption: observer_panels.draw(rows, [*observers], level)} if drawn else {},
+        Origin(line, versions(), settings),
+    )

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import astuple, fields
 from typing import Any
 
-from tabulate import tabulate
 from tqdm import tqdm
 
 from .. import files
@@ -15,20 +14,34 @@ from ..evaluation import candidates, formats, on_recordings, real_sweeps
 from ..evaluation.candidates import Candidate, Candidates
 from ..evaluation.on_recordings import Row, Runs
 from ..evaluation.real_sweeps import Lost, Mistaken
-from ..evaluation.report import fault_panels, figures
+from ..evaluation.report import fault_panels, figures, observer_page
+from ..evaluation.report.observer_page import Origin, Table
 from ..evaluation.store import digest, kept
 from ..observers import SlidingModeObserver
 from ..recordings import CART_POLE, RIGS, load, smoothing
 from ..recordings.loading import holds
+from .arguments import versions
 from .entry import Stop
 
 RESULTS = ("real.csv", "lost.csv", "mismatch.csv", "real.md")
 FIGURE = "fault"
+PAGE = "observers.html"
+TOLD = (
+    "Each observer runs through the test recordings, which its numbers were not tuned on. No true velocity is "
+    "known: errors are told against that of a smoother, which sees the whole recording. Nothing is random but the "
+    "resampling of runs for the intervals, whose seed is fixed. ns is the time for a sample."
+)
+CAPTION = "A passage of the sensor's fault: what it reads, and how far off the speed of some observers is meanwhile."
 SMO = "smo"
 
 
-def measure(args: argparse.Namespace) -> int:
-    """Measure all rigs of a folder; 0 when all went well."""
+def measure(args: argparse.Namespace, line: str) -> int:
+    """Measure all rigs of a folder; 0 when all went well.
+
+    Args:
+        args: of ``smo-gym observers``.
+        line: that makes the results again.
+    """
     found = {rig.name: load(rig, args.data, "test") for rig in RIGS.values() if holds(rig, args.data)}
     if not found:
         raise ValueError(f"--data {args.data}: has no folder of {' or '.join(RIGS)}, and no *.csv")
@@ -36,12 +49,14 @@ def measure(args: argparse.Namespace) -> int:
     rows: list[Row] = []
     lost: list[Lost] = []
     mistaken: list[Mistaken] = []
+    used: dict[str, Any] = {}
     figure: Any = None
-    with files.claimed(args.out, (*RESULTS, *drawings)) as out, kept(out) as store:
+    with files.claimed(args.out, (*RESULTS, PAGE, *drawings)) as out, kept(out) as store:
         try:
             for name, recordings in found.items():
                 settings = candidates.named(name)
                 observers = {each: settings[each] for each in args.observer or settings.observers}
+                used[name] = candidates.told(observers)
                 runs = Runs.of(RIGS[name], recordings)
                 with tqdm(total=len(observers), unit="observer", desc=name, leave=False, disable=None) as bar:
                     rows += on_recordings.rows(runs, observers, bar.update)
@@ -51,22 +66,33 @@ def measure(args: argparse.Namespace) -> int:
                     lost += real_sweeps.lost(runs, smo)
                 if args.mismatch and name == CART_POLE.name:
                     mistaken += _mistaken(args, settings, [*observers], runs, store)
-                if args.figure and figure is None and any(each.fault.any() for each in recordings):
+                if (args.figure or args.report) and figure is None and any(each.fault.any() for each in recordings):
                     figure = fault_panels.draw(runs, observers)
         except KeyboardInterrupt:
             raise Stop(f"interrupted; the same command goes on from what is in {out}") from None
-        told = [_table(rig, rows, "github") for rig in found] + _sweeps(lost, mistaken, "github")
-        made: dict[str, str | bytes] = {RESULTS[0]: _csv(Row, rows, leave="each"), RESULTS[3]: "\n\n".join(told) + "\n"}
+        tables = [_table(rig, rows) for rig in found] + _sweeps(lost, mistaken)
+        made: dict[str, str | bytes] = {
+            RESULTS[0]: _csv(Row, rows, leave="each"),
+            RESULTS[3]: observer_page.text(tables, "github") + "\n",
+        }
         if lost:
             made[RESULTS[1]] = _csv(Lost, lost)
         if mistaken:
             made[RESULTS[2]] = _csv(Mistaken, mistaken)
-        if figure is not None:
+        if figure is not None and args.figure:
             made |= {f"{FIGURE}.{form}": figures.encode(figure, form) for form in figures.FORMATS}
+        if args.report:
+            made[PAGE] = observer_page.render(
+                "Observers on recordings of real rigs",
+                TOLD,
+                tables,
+                {} if figure is None else {CAPTION: figure},
+                Origin(line, versions(), used),
+            )
         try:
-            files.write_set(out, made)
+            files.write_set(out, made, [PAGE])
         finally:  # what cannot be written can be read at least
-            print("\n\n".join([_table(rig, rows, "simple") for rig in found] + _sweeps(lost, mistaken, "simple")))
+            print(observer_page.text(tables, "simple"))
     print(f"\nresults are in {args.out}")
     return 0
 
@@ -96,7 +122,7 @@ def _csv(kind: type, rows: Sequence[Any], leave: str = "") -> str:
     return formats.as_csv([names[i] for i in keep], [[astuple(row)[i] for i in keep] for row in rows])
 
 
-def _table(rig: str, rows: Sequence[Row], form: str) -> str:
+def _table(rig: str, rows: Sequence[Row]) -> Table:
     """An observer a line, against the smoother with the model; of the other references the errors alone."""
     mine = [row for row in rows if row.rig == rig]
     first, second = RIGS[rig].channels
@@ -131,14 +157,14 @@ def _table(rig: str, rows: Sequence[Row], form: str) -> str:
         "SG",
         "ns",
     )
-    told = tabulate(lines, header, form, disable_numparse=True)
-    return (
+    title = (
         f"{rig}: RMS errors and their 95 % intervals over {mine[0].runs} runs, reference: smoother with the model\n"
-        f"(fault: median and largest peak where the sensor says nothing; SG: against Savitzky and Golay)\n\n{told}"
+        "(fault: median and largest peak where the sensor says nothing; SG: against Savitzky and Golay)"
     )
+    return Table(title, header, lines)
 
 
-def _sweeps(lost: Sequence[Lost], mistaken: Sequence[Mistaken], form: str) -> list[str]:
+def _sweeps(lost: Sequence[Lost], mistaken: Sequence[Mistaken]) -> list[Table]:
     found = []
     if lost:
         lines = [
@@ -154,7 +180,7 @@ def _sweeps(lost: Sequence[Lost], mistaken: Sequence[Mistaken], form: str) -> li
         ]
         header = ("gain of the pole", "its condition holds", "lost, cold start", "warm", "RMS, cold", "warm")
         title = "The article's observer on the cart pole: runs lost over (28)'s m1 and (30)'s beta_1"
-        found.append(f"{title}\n\n{tabulate(lines, header, form, disable_numparse=True)}")
+        found.append(Table(title, header, lines))
     if mistaken:
         of = {(row.mismatch, row.observer, row.retuned, row.channel): row.rmse for row in mistaken}
         names = list(dict.fromkeys(row.observer for row in mistaken))
@@ -168,7 +194,5 @@ def _sweeps(lost: Sequence[Lost], mistaken: Sequence[Mistaken], form: str) -> li
                 cells.append(f"{of[(*again, first)]:.3f} / {pole[0]:.2f} > {pole[1]:.3f}")
             wrong.append((name, *cells))
         title = "Wrong models: cart m/s tuned again / pole rad/s as tuned for the right model > tuned again"
-        found.append(
-            f"{title}\n\n{tabulate(wrong, ('observer', *real_sweeps.MISMATCHES), form, disable_numparse=True)}"
-        )
+        found.append(Table(title, ("observer", *real_sweeps.MISMATCHES), wrong))
     return found

@@ -93,6 +93,11 @@ def named(name: str) -> Candidates:
     return load(configs.path(f"observers-{name}"))
 
 
+def told(observers: Mapping[str, Candidate]) -> dict[str, Any]:
+    """What each is, and its numbers with their sources."""
+    return {name: each.model_dump(mode="json", exclude={"title"}) for name, each in observers.items()}
+
+
 def merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     """Two trees as one; where both have a number, that of ``above``."""
     both = {

@@ -38,6 +38,12 @@ def mathtext(text: str) -> str:
     return line(text).replace("$", r"\$")
 
 
+def typeset(text: str) -> str:
+    """A text as a page shows it: θ, primes and squares, and the apostrophes of words."""
+    primed = re.sub(r"\b(h|theta)'(?!\w)", r"\1′", line(text))
+    return re.sub(r"\btheta\b", "θ", primed).replace("'", "’").replace("^2", "²")
+
+
 def escaped(text: str, form: str) -> str:
     """A text in a format of tabulate: as LaTeX, as Markdown or, on a console, as one line."""
     return latex(text) if form.startswith("latex") else markdown(text) if form == "github" else line(text)

@@ -1,6 +1,7 @@
 """Velocities of a log, the tuner and the table, as commands."""
 
 import csv
+import sys
 
 import numpy as np
 import pytest
@@ -111,8 +112,8 @@ def test_tuning_writes_settings_that_can_be_used(command, tmp_path):
 
 
 def test_the_table_of_a_few_runs(command, tmp_path):
-    given = ("--observer", "smo-tuned", "--sensor", "exact", "noise", "--runs", "2", "--figure", "--out", tmp_path)
-    done = command("observers", *given)
+    given = ("--observer", "smo-tuned", "--sensor", "exact", "noise", "--runs", "2", "--out", tmp_path)
+    done = command("observers", *given, "--figure", "--report")
 
     with (tmp_path / "observers.csv").open() as file:
         rows = list(csv.DictReader(file))
@@ -120,6 +121,23 @@ def test_the_table_of_a_few_runs(command, tmp_path):
     assert {row["loop"] for row in rows} == {"open", "closed"}
     assert "smo-tuned" in done.stdout
     assert (tmp_path / "observers.png").exists()
+    page = (tmp_path / "observers.html").read_text(encoding="utf-8")
+    shown = ["exact", "0.2", "open", "smo-tuned", "theta_dot"]
+    (cell,) = (f"{float(row['rmse']):.2g}" for row in rows if [*row.values()][:5] == shown)
+    assert f'<th scope="row">smo-tuned</th><td>{cell}</td>' in page.partition("Open loop, θ′</h2>")[2]
+    assert "--figure --report" in page
+    assert "<svg" in page
+
+    command("observers", *given)
+    assert not (tmp_path / "observers.html").exists()  # it was of other numbers
+
+
+def test_a_report_without_its_extra_is_refused_before_any_run(command, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    done = command("observers", "--report", "--out", tmp_path / "out", check=False)
+    assert done.returncode == 2
+    assert 'a report needs jinja2: pip install "smo_gym[report,plots]"' in done.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_rigs_model_and_tuning_by_name(command, tmp_path):

@@ -208,10 +208,14 @@ def test_runs_are_lost_where_the_conditions_fail(runs):
 @there
 @pytest.mark.slow
 def test_the_command_writes_the_table(command, tmp_path):
-    command("observers", "--data", DATA, "--observer", "ekf", "backward-difference", "--out", tmp_path, "--figure")
+    given = ("--data", DATA, "--observer", "ekf", "backward-difference", "--out", tmp_path)
+    command("observers", *given, "--figure", "--report")
     header = (tmp_path / "real.csv").read_text().splitlines()[0]
     wanted = (
         "rig,observer,channel,reference,rmse,ci_low,ci_high,lag_ms,total_variation,largest,fault_median,fault_largest"
     )
     assert header == f"{wanted},lost,runs,ns"
     assert (tmp_path / "fault.png").exists()
+    page = (tmp_path / "observers.html").read_text(encoding="utf-8")
+    assert page.count('<th scope="row">ekf</th>') == 2  # rigs
+    assert "<svg" in page

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHOWN = {
-    "backward-difference": "#C9C9C9",
+    "backward-difference": "#8F8F8F",
     "kalman-ca": "#D55E00",
     "ekf": "#B35C92",
     "smo": "#0072B2",

@@ -28,6 +28,11 @@ SAMPLES = 500
 DENSE = 20_000
 """Instants of a start's trace: every control instant, also where an episode is not cut short (:func:`starts`)."""
 FORMATS = ("pdf", "png")
+_UNSAID: dict[str, dict[str, Any]] = {
+    "pdf": {"CreationDate": None},
+    "svg": dict.fromkeys(("Creator", "Date", "Format", "Type")),
+}
+"""What is told of a file unless it is not to be: the day, and addresses."""
 _QUANTITIES = {
     "states": r"States $h$ and $\theta$",
     "errors": r"Estimation errors of $h$ and $\theta$",
@@ -54,6 +59,7 @@ STYLE: dict[Any, Any] = {
     "legend.borderaxespad": 0.1,
     "hatch.linewidth": 0.6,
     "pdf.fonttype": 42,
+    "svg.hashsalt": "smo_gym",
     "savefig.dpi": 200,
 }
 
@@ -226,12 +232,12 @@ def _bars(plan: Plan, outcomes: Iterable[Outcome], results: Iterable[Result]) ->
 
 
 def encode(figure: Figure, form: str) -> bytes:
-    """A figure as the bytes of a file in one of :data:`FORMATS`; the same figure gives the same bytes."""
+    """A figure as the bytes of a file, of :data:`FORMATS` or svg, which has no ground; the same bytes each time."""
     from matplotlib import rc_context
 
     file = io.BytesIO()
     with rc_context(STYLE):
-        figure.savefig(file, format=form, metadata={"CreationDate": None} if form == "pdf" else None)
+        figure.savefig(file, format=form, metadata=_UNSAID.get(form), transparent=form == "svg")
     return _small(file) if form == "png" else file.getvalue()
 
 

@@ -12,7 +12,6 @@ import math
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from .. import between, formats
 from ..arms import ARMS
 from ..statistics import Result, place
 from ..study import Group, Outcome
-from . import page_figures, page_numbers, tables
+from . import page_figures, page_numbers, tables, template
 from .page_traces import LEVELS, SENSED, channels, pack, runs_that_fit
 from .panels import WINDOW
 from .provenance import sources
@@ -57,18 +56,9 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         command: the command line that made them.
         versions: of what took part, by name.
     """
-    import jinja2
     from markupsafe import Markup
     from plotly.offline import get_plotlyjs
 
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("smo_gym.evaluation.report", "assets"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    page = resources.files(__package__) / "assets"
     runs = runs_that_fit(outcomes)
     places, packed = pack(outcomes, runs)
     groups = [_group(outcome, where) for outcome, where in zip(outcomes, places, strict=True)]
@@ -78,9 +68,9 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         "scatter": page_figures.scatter(results),
         "bars": page_figures.bars(results),
     }
-    page_text = environment.get_template("page.html").render(
-        style=Markup((page / "page.css").read_text(encoding="utf-8")),
-        scripts=Markup("\n".join((page / name).read_text(encoding="utf-8") for name in _SCRIPTS)),
+    return template.filled(
+        "page.html",
+        _SCRIPTS,
         plotly=base64.b64encode(zlib.compress(get_plotlyjs().encode(), 9)).decode("ascii"),
         packed=packed,
         data={
@@ -110,7 +100,6 @@ def render(outcomes: Sequence[Outcome], results: Sequence[Result], command: str,
         command=command,
         versions=versions,
     )
-    return page_text.encode("utf-8", "replace").decode("utf-8")  # a path need not be text
 
 
 def _json(figures: Mapping[str, Any]) -> str:
@@ -195,13 +184,9 @@ def _diagnosed(outcomes: Sequence[Outcome]) -> list[dict[str, Any]]:
     for title, columns in blocks.items():
         arms = tuple(column.pop("arm") for column in columns)
         metrics = [(name, [column[name] for column in columns]) for name in columns[0]]
-        values = [(_typeset(name), [*map(_in_full, shown)]) for name, shown in metrics if any(shown)]
+        values = [(formats.typeset(name), [*map(_in_full, shown)]) for name, shown in metrics if any(shown)]
         found.append({"title": title, "arms": arms, "rows": values})
     return found
-
-
-def _typeset(name: str) -> str:
-    return name.replace("theta", "θ").replace("'", "′").replace("^2", "²")
 
 
 def _in_full(number: str) -> str:

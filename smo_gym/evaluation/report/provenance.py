@@ -32,6 +32,11 @@ def sources(outcomes: Sequence[Outcome]) -> list[dict[str, str]]:
     return [{**row._asdict(), "tables": ", ".join(dict.fromkeys(found[row]))} for row in rows]
 
 
+def settings(tree: Any) -> list[dict[str, str]]:
+    """The settings in a tree, each a row."""
+    return [row._asdict() for row in _walk(tree, ())]
+
+
 def _plant(scenario: Scenario, outcomes: Sequence[Outcome]) -> Iterable[_Row]:
     """The nominal plant, which the runs at 0 % have."""
     plant = CartPendulum.of(
