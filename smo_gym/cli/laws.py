@@ -21,15 +21,16 @@ from ..evaluation import formats, law_promise, law_settings
 from ..evaluation.law_cases import ESTIMATES, LEARNING, PERIODS, SENSORS, cases
 from ..evaluation.law_settings import Laws
 from ..evaluation.law_table import Cell, Row, cells, measured, row
-from ..evaluation.report import figures, law_panels
+from ..evaluation.report import figures, law_panels, table_page
+from ..evaluation.report.table_page import Origin, Table
 from ..evaluation.store import digest
 from ..typing import Array
 from . import computing
-from .arguments import Parser, one_of, several
-from .entry import command
+from .arguments import Parser, one_of, several, versions
+from .entry import command, typed
 
 RESULTS = ("laws.csv", "laws.md")
-FIGURE = "laws"
+FIGURE, PAGE = "laws", "laws.html"
 
 
 @command("laws")
@@ -58,18 +59,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.runs(200, "random plants in each cell")
     parser.seed("the random plants, starts and noise")
     parser.add_argument("--figure", action="store_true", help="draw it, as PDF and PNG into DIR")
+    parser.add_argument("--report", action="store_true", help=f"write tables that sort and the picture into DIR/{PAGE}")
     parser.out("laws")
     computing.add(parser)
     args = parser.parse_args(arguments)
     if args.promise:
         return promised(args.runs, args.seed)
+    if args.report:
+        table_page.check()
     laws = law_settings.named()
     periods, names = [float(period) for period in args.period], [*(args.law or laws.laws)]
     wanted = cells(laws, names, args.observer, args.case, args.sensor, periods, args.runs, args.seed, args.outside)
     if not wanted:
         raise ValueError(f"--law {' '.join(args.law or [])} has no gains for --case {' '.join(args.case)} there")
     drawings = [f"{FIGURE}.{form}" for form in figures.FORMATS] if args.figure else []
-    with files.claimed(args.out, (*RESULTS, *drawings)) as out, computing.working(args, out) as (mapped, store):
+    with files.claimed(args.out, (*RESULTS, PAGE, *drawings)) as out, computing.working(args, out) as (mapped, store):
         keys = {cell: _key(laws, cell) for cell in wanted}
         rows = {cell: row(cell, kept) for cell in wanted if (kept := store.read(keys[cell])) is not None}
         left = [cell for cell in wanted if cell not in rows]
@@ -82,15 +86,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ordered = [rows[cell] for cell in wanted]
         made: dict[str, str | bytes] = {
             RESULTS[0]: formats.as_csv([field.name for field in fields(Row)], map(astuple, ordered)),
-            RESULTS[1]: "\n\n".join(_tables(laws, ordered, "github")) + "\n",
+            RESULTS[1]: table_page.text(_tables(laws, ordered), "github") + "\n",
         }
+        titles = {name: law.title for name, law in laws.laws.items()}
+        if args.report:
+            tables, origin = _tables(laws, ordered), Origin(typed("laws", arguments), versions(), _sources(laws))
+            drawn = {CAPTION: law_panels.draw(ordered, titles)}
+            made[PAGE] = table_page.render("Laws on estimates", _TOLD, tables, drawn, origin)
         if args.figure:
-            figure = law_panels.draw(ordered, {name: law.title for name, law in laws.laws.items()})
+            figure = law_panels.draw(ordered, titles)
             made |= {f"{FIGURE}.{form}": figures.encode(figure, form) for form in figures.FORMATS}
         try:
-            files.write_set(out, made)
+            files.write_set(out, made, [PAGE])
         finally:  # what cannot be written can be read at least
-            print("\n\n".join(_tables(laws, ordered, "simple")))
+            print(table_page.text(_tables(laws, ordered), "simple"))
     print(f"\nresults are in {args.out}")
     return 0
 
@@ -111,6 +120,25 @@ def promised(runs: int, seed: int) -> int:
     header = ("design", "L, m/s³", "conditions", "sigma kept at 0, inside", "largest sigma, m/s")
     print(tabulate(lines, header, "simple", disable_numparse=True))
     return 0
+
+
+_TOLD = (
+    "Means over the random plants that did not fail, with 95 % intervals (Student's); a run that failed is counted. TV "
+    "is the total variation of the force, from 0. All laws were tuned with the same budget on other plants."
+)
+CAPTION = (
+    "Errors against the force's total variation, on the filter's estimate behind noise, every 20 ms. Blue: no other "
+    "law is better in both."
+)
+
+
+def _sources(laws: Laws) -> dict[str, object]:
+    """What was tuned, by law and family."""
+    return {
+        name: {family: each.model_dump(mode="json") for family, each in law.tuned.items()}
+        for name, law in laws.laws.items()
+        if law.tuned
+    }
 
 
 def _key(laws: Laws, cell: Cell) -> str:
@@ -135,7 +163,7 @@ _SHOWN = (
 """What the console shows: case, disturbed, observer, its start, sensor, control period."""
 
 
-def _tables(laws: Laws, rows: Sequence[Row], form: str) -> list[str]:
+def _tables(laws: Laws, rows: Sequence[Row]) -> list[Table]:
     """A table for each place that is shown, a law a line; of a choice that has none of these, for each that it has."""
     places = list(dict.fromkeys(_place(row) for row in rows))
     shown = [place for place in _SHOWN if place in places] or places
@@ -168,7 +196,7 @@ def _tables(laws: Laws, rows: Sequence[Row], form: str) -> list[str]:
         case, disturbed, observer, start, sensor, period = place
         pushed = "disturbed, with friction" if disturbed == "yes" else "undisturbed"
         title = f"{case}, {pushed}: {observer} from {start}, sensor {sensor}, {1e3 * period:g} ms"
-        found.append(f"{title}\n\n{tabulate(lines, header, form, disable_numparse=True)}")
+        found.append(Table(title, header, lines))
     return found
 
 

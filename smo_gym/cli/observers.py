@@ -18,8 +18,8 @@ from tqdm import tqdm
 from .. import files
 from ..evaluation import candidates, formats, observing, robustness, velocity_errors
 from ..evaluation.observing import Row
-from ..evaluation.report import figures, observer_page, observer_panels
-from ..evaluation.report.observer_page import Origin, Table
+from ..evaluation.report import figures, observer_panels, table_page
+from ..evaluation.report.table_page import Origin, Table
 from ..evaluation.store import FOLDER, Store
 from ..evaluation.study import simulated_seconds
 from . import computing, real
@@ -58,7 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if args.mismatch and args.data is None:
         raise ValueError("--mismatch is of recordings: give their folder with --data")
     if args.report:
-        observer_page.check()
+        table_page.check()
     line = typed("observers", arguments)
     return _simulated(args, line) if args.data is None else real.measure(args, line)
 
@@ -102,7 +102,7 @@ def _simulated(args: argparse.Namespace, line: str) -> int:
         speed = {name: observing.nanoseconds(candidate) for name, candidate in observers.items()}
         made: dict[str, str | bytes] = {
             RESULTS[0]: _csv(rows, speed),
-            RESULTS[1]: observer_page.text(_tables(rows, speed), "github") + "\n",
+            RESULTS[1]: table_page.text(_tables(rows, speed), "github") + "\n",
         }
         if args.figure:
             figure = observer_panels.draw(rows, [*observers], observing.LEVELS[-1])
@@ -112,7 +112,7 @@ def _simulated(args: argparse.Namespace, line: str) -> int:
         try:
             files.write_set(out, made, [real.PAGE])
         finally:  # what cannot be written can be read at least
-            print(observer_page.text(_tables(rows, speed), "simple"))
+            print(table_page.text(_tables(rows, speed), "simple"))
     print(f"\nresults are in {args.out}")
     return 0
 
@@ -185,7 +185,7 @@ def _page(
         },
         **candidates.told(observers),
     }
-    return observer_page.render(
+    return table_page.render(
         "Observers on simulated encoders",
         f"{args.runs} random plants, uncertain by {100 * level:g} %, seed {args.seed}; {RESULTS[0]} has the smaller "
         f"levels too. In the open loop {observing.LAW.upper()} acts on the true state, and all observers see the same "

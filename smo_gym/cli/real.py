@@ -14,8 +14,8 @@ from ..evaluation import candidates, formats, on_recordings, real_sweeps
 from ..evaluation.candidates import Candidate, Candidates
 from ..evaluation.on_recordings import Row, Runs
 from ..evaluation.real_sweeps import Lost, Mistaken
-from ..evaluation.report import fault_panels, figures, observer_page
-from ..evaluation.report.observer_page import Origin, Table
+from ..evaluation.report import fault_panels, figures, table_page
+from ..evaluation.report.table_page import Origin, Table
 from ..evaluation.store import digest, kept
 from ..observers import SlidingModeObserver
 from ..recordings import CART_POLE, RIGS, load, smoothing
@@ -73,7 +73,7 @@ def measure(args: argparse.Namespace, line: str) -> int:
         tables = [_table(rig, rows) for rig in found] + _sweeps(lost, mistaken)
         made: dict[str, str | bytes] = {
             RESULTS[0]: _csv(Row, rows, leave="each"),
-            RESULTS[3]: observer_page.text(tables, "github") + "\n",
+            RESULTS[3]: table_page.text(tables, "github") + "\n",
         }
         if lost:
             made[RESULTS[1]] = _csv(Lost, lost)
@@ -82,7 +82,7 @@ def measure(args: argparse.Namespace, line: str) -> int:
         if figure is not None and args.figure:
             made |= {f"{FIGURE}.{form}": figures.encode(figure, form) for form in figures.FORMATS}
         if args.report:
-            made[PAGE] = observer_page.render(
+            made[PAGE] = table_page.render(
                 "Observers on recordings of real rigs",
                 TOLD,
                 tables,
@@ -92,7 +92,7 @@ def measure(args: argparse.Namespace, line: str) -> int:
         try:
             files.write_set(out, made, [PAGE])
         finally:  # what cannot be written can be read at least
-            print(observer_page.text(tables, "simple"))
+            print(table_page.text(tables, "simple"))
     print(f"\nresults are in {args.out}")
     return 0
 

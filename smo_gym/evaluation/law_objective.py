@@ -47,6 +47,7 @@ def of_law(laws: Laws, name: str, family: str) -> Callable[[Tree], float]:
             return 10.0 * FALL
         h, theta, variation = (float(found[key][stood].mean()) for key in ("mse_h", "mse_theta", "total_variation"))
         smooth = weight * math.log(max(variation, 1e-9) / _VARIATION)
-        return ((h / a) ** p + (theta / b) ** p) ** (1.0 / p) + smooth + FALL * float(1.0 - stood.mean())
+        size: float = ((h / a) ** p + (theta / b) ** p) ** (1.0 / p)
+        return size + smooth + FALL * float(1.0 - stood.mean())
 
     return cost

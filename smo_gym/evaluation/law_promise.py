@@ -13,7 +13,7 @@ from ..controllers.integral_sliding_mode import PREDICTED
 from ..loop import Loop
 from ..observers import Oracle
 from ..plant import CartPendulum
-from ..typing import Array
+from ..typing import Array, Flags
 from ..wrappers import VectorObserverWrapper
 from . import law_settings
 from .draws import deviations, noise
@@ -42,7 +42,7 @@ class Promise:
     """What its gains are made for, m/s^3."""
     steepest: Array
     """Largest ``|d'|`` of each run in m/s^3, (runs,)."""
-    unsaturated: Array
+    unsaturated: Flags
     """Whether the force stayed within its limit, (runs,)."""
     least_gain: float
     """Least factor b of v in any run."""
@@ -50,12 +50,12 @@ class Promise:
     """Largest ``|sigma|`` of each run in m/s once it has settled, (runs,)."""
 
     @property
-    def inside(self) -> Array:
+    def inside(self) -> Flags:
         """Which runs stayed in the set that the conditions are declared over."""
         return (self.steepest <= BOUND) & self.unsaturated
 
     @property
-    def kept(self) -> Array:
+    def kept(self) -> Flags:
         """In which sigma stayed at 0."""
         return self.largest <= TOLERANCE * PERIOD**2 * BOUND
 

@@ -20,7 +20,7 @@ def rows(out):
 
 def test_the_table_has_its_columns_a_row_for_each_cell_and_a_picture(tmp_path, capsys):
     out = tmp_path / "out"
-    assert laws.main([*FEW, "--law", "linear", "ism-pi", "--figure", "--out", str(out)]) == 0
+    assert laws.main([*FEW, "--law", "linear", "ism-pi", "--figure", "--report", "--out", str(out)]) == 0
     found = rows(out)
     assert (out / "laws.csv").read_text().startswith(COLUMNS)
     assert [(row["law"], row["disturbed"]) for row in found] == [
@@ -30,6 +30,9 @@ def test_the_table_has_its_columns_a_row_for_each_cell_and_a_picture(tmp_path, c
         ("ism-pi", "yes"),
     ]
     assert all((row["runs"], row["failures"]) == ("3", "0") for row in found)
+    page = (out / "laws.html").read_text()
+    assert "PI on the same variable" in page
+    assert "http" not in page.replace("http://www.w3.org", "")
     assert (out / "laws.png").stat().st_size > 10_000
     assert "PI on the same variable" in capsys.readouterr().out
     again = tmp_path / "again"

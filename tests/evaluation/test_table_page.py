@@ -8,8 +8,8 @@ from matplotlib.text import Text
 from smo_gym.cli.arguments import versions
 from smo_gym.evaluation import candidates
 from smo_gym.evaluation.observing import Row
-from smo_gym.evaluation.report import observer_page, observer_panels
-from smo_gym.evaluation.report.observer_page import Origin, Table
+from smo_gym.evaluation.report import observer_panels, table_page
+from smo_gym.evaluation.report.table_page import Origin, Table
 
 EVIL = "<script>alert(1)</script>"
 ERRORS = {"ekf": "0.01 / 2", "smo-tuned": "3e-07", "luenberger": "10 (2 lost)", EVIL: "-", "ukf": "0.5"}
@@ -31,7 +31,7 @@ def page():
         for channel in ("h_dot", "theta_dot")
     ]
     known = candidates.named("simulated").observers
-    return observer_page.render(
+    return table_page.render(
         "Observers",
         f"How it was measured, by {EVIL}",
         [Table("Open loop, theta': RMS", ("observer", "counts", "ns"), [*((n, e, 7) for n, e in ERRORS.items())])],
