@@ -21,7 +21,7 @@ from .plant import CartPendulum
 from .reference import Reference
 from .wrappers import ObserverWrapper, VectorObserverWrapper
 
-__version__ = "0.6.0"
+__version__ = "0.8.0"
 
 __all__ = [
     "LQR",

@@ -89,12 +89,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             RESULTS[1]: table_page.text(_tables(laws, ordered), "github") + "\n",
         }
         titles = {name: law.title for name, law in laws.laws.items()}
+        kinds = {name: law.kind for name, law in laws.laws.items()}
         if args.report:
             tables, origin = _tables(laws, ordered), Origin(typed("laws", arguments), versions(), _sources(laws))
-            drawn = {CAPTION: law_panels.draw(ordered, titles)}
+            drawn = {CAPTION: law_panels.draw(ordered, titles, kinds)}
             made[PAGE] = table_page.render("Laws on estimates", _TOLD, tables, drawn, origin)
         if args.figure:
-            figure = law_panels.draw(ordered, titles)
+            figure = law_panels.draw(ordered, titles, kinds)
             made |= {f"{FIGURE}.{form}": figures.encode(figure, form) for form in figures.FORMATS}
         try:
             files.write_set(out, made, [PAGE])
@@ -126,10 +127,7 @@ _TOLD = (
     "Means over the random plants that did not fail, with 95 % intervals (Student's); a run that failed is counted. TV "
     "is the total variation of the force, from 0. All laws were tuned with the same budget on other plants."
 )
-CAPTION = (
-    "Errors against the force's total variation, on the filter's estimate behind noise, every 20 ms. Blue: no other "
-    "law is better in both."
-)
+CAPTION = "Errors against the force's total variation, on the filter's estimate behind noise, every 20 ms."
 
 
 def _sources(laws: Laws) -> dict[str, object]:

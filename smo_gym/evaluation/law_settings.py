@@ -19,6 +19,7 @@ from ..controllers import (
     SlidingModeController,
     SurfaceControl,
 )
+from ..controllers.reaching import PI
 from ..plant import CartPendulum
 from ..validation import choice
 from . import configs, reading
@@ -68,6 +69,12 @@ class LawCandidate(Strict):
     def estimate(self) -> Estimate | None:
         """The same as an estimate."""
         return None if self.on is None else Estimate(self.on, MEASURED)
+
+    @property
+    def kind(self) -> str:
+        """Which of the kinds that pictures tell apart: that of its law, and PI on a sliding variable."""
+        linear = self.settings.get("reaching", {}).get("kind") == PI
+        return PI if linear else self.law
 
     def acts(self, family: str) -> bool:
         """Whether it has gains for a family of cases."""

@@ -247,5 +247,5 @@ def _small(png: io.BytesIO) -> bytes:
 
     file = io.BytesIO()
     with Image.open(png) as image:
-        image.convert("RGB").quantize(_PALETTE).save(file, "png", optimize=True, dpi=image.info["dpi"])
+        image.convert("RGB").quantize(_PALETTE, kmeans=1).save(file, "png", optimize=True, dpi=image.info["dpi"])
     return file.getvalue()
