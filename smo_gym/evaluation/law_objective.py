@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from .candidates import Tree
-from .law_cases import MEASURED, ZERO, Estimate, Place, run
+from .law_cases import MEASURED, ZERO, Estimate, Place, cases, run
 from .law_settings import Laws
 
 TRAINING: dict[str, Place] = {
@@ -33,7 +33,7 @@ def of_law(laws: Laws, name: str, family: str) -> Callable[[Tree], float]:
     """The objective of a law in a family, of its numbers.
 
     ``((mse_h / a)^p + (mse_theta / b)^p)^(1/p) + w ln(TV / 100 N) + 20 (share of runs that fail)``, means over training
-    plants that did not fail, with the family's scales (a, b), norm p and smoothness w.
+    plants that did not fail, with the family's scales (a, b), norm p and smoothness w; more where none stands.
     """
     place = TRAINING[family]
     place = replace(place, estimate=laws[name].estimate or place.estimate, period=laws[name].period or place.period)
@@ -43,8 +43,8 @@ def of_law(laws: Laws, name: str, family: str) -> Callable[[Tree], float]:
     def cost(tuned: Tree) -> float:
         found = run(place, laws.of(name, family, tuned), settings.runs, SEED)
         stood = found["failed"] == 0.0
-        if not stood.any():
-            return 10.0 * FALL
+        if not stood.any():  # the later the better, or a search would see no slope
+            return FALL * (2.0 - float(found["duration"].mean()) / cases()[place.case].horizon)
         h, theta, variation = (float(found[key][stood].mean()) for key in ("mse_h", "mse_theta", "total_variation"))
         smooth = weight * math.log(max(variation, 1e-9) / _VARIATION)
         size: float = ((h / a) ** p + (theta / b) ** p) ** (1.0 / p)

@@ -31,6 +31,7 @@ SHARED = {
     "real",
     "recording",
     "starting",
+    "tune_laws",
 }
 posix = pytest.mark.skipif(os.name != "posix", reason="of POSIX systems")
 

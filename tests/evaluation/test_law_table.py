@@ -44,7 +44,7 @@ def test_all_were_tuned_with_the_same_budget(laws):
     """Notes of what was tuned say so, and no number stayed where the search began."""
     notes = [each.note for law in laws.laws.values() for each in law.tuned.values()]
     assert len(notes) > 50
-    assert all(note.startswith(f"CMA-ES, {laws.budget} evaluations; objective ") for note in notes)
+    assert all(note.startswith(f"CMA-ES, {laws.budget} evaluations; objective") for note in notes)
     assert all(each.source == "identified" for law in laws.laws.values() for each in law.tuned.values())
 
 
@@ -64,7 +64,7 @@ def test_a_run_of_the_table_is_a_run_of_the_harness():
     plants = [CartPendulum().perturbed(0.2 * draw).as_array() for draw in deviations(7, 3)]
     reset = {"state": np.tile(case.low, (3, 1)), "params": np.array(plants)}
     observed = VectorObserverWrapper(env, PLACE.estimate.build())
-    result = rollout.rollout(observed, linear(0.02, None), options=reset, trace_every=1)
+    result = rollout(observed, linear(0.02, None), options=reset, trace_every=1)
     assert np.array_equal(result.metrics["mse_h"], found["mse_h"])
     late = np.abs(np.diff(result.traces.u_mean, axis=0))[-250:].sum(0)
     assert found["late_variation"] == pytest.approx(late, rel=1e-9, abs=1e-12)
