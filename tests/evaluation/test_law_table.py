@@ -122,7 +122,7 @@ def test_the_objective_prefers_what_is_better_and_counts_falls(laws):
     cost = of_law(laws, "linear", "regulation-filtered")
     good = cost({"K": [18.0, -25.0, 15.0, -3.0]})
     assert good < cost({"K": [7.197, -4.026, 10.96, -0.9999]}) < 20.0
-    assert cost({"K": [-18.0, 25.0, -15.0, 3.0]}) > 100.0
+    assert cost({"K": [-18.0, 25.0, -15.0, 3.0]}) > 20.0
 
 
 def test_tuned_numbers_are_of_the_shape_that_the_law_takes(laws):
