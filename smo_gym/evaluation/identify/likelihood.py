@@ -36,12 +36,16 @@ class Prediction:
 
 
 def ten_run_means(values: Array) -> Prediction:
-    """What runs (rows, runs, cells) say of the logarithms of means of ten runs such as these, to second order."""
+    """What runs (rows, runs, cells) say of the logarithm of another mean of ten such runs, to second order.
+
+    Its covariance holds that of the mean of these runs, too, which takes the place of the true one.
+    """
+    n = values.shape[1]
     mean = values.mean(axis=1, keepdims=True)
     off = values / mean - 1.0
-    covariance = np.einsum("rni,rnj->rij", off, off) / (values.shape[1] - 1) / PRINTED_RUNS
-    variance = np.diagonal(covariance, axis1=1, axis2=2)
-    return Prediction(np.log(mean[:, 0]) - 0.5 * variance, covariance)
+    each = np.einsum("rni,rnj->rij", off, off) / (n - 1)
+    covariance = each * (1.0 / PRINTED_RUNS + 1.0 / n)
+    return Prediction(np.log(mean[:, 0]) - 0.5 * np.diagonal(each, axis1=1, axis2=2) / PRINTED_RUNS, covariance)
 
 
 @dataclass(frozen=True, slots=True)
