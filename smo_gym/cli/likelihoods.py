@@ -16,6 +16,7 @@ from ..evaluation.identify import table7
 from ..evaluation.identify.runs import STATES
 from ..evaluation.identify.search import Search, cost
 from ..evaluation.identify.table5 import PARAMETERS, Table5, hold_out
+from ..typing import Array
 
 STATE = "state.json"
 Costs = Sequence[Sequence[float]]
@@ -99,7 +100,7 @@ def structures(args: Namespace, costs: Sequence[Costs], save: Save) -> Report:
     tried = table7.structures(place)
     known = [*costs, *([()] * (len(tried) - len(costs)))]
     searches: list[Search] = []
-    points = []
+    points: list[tuple[table7.Structure, Array]] = []
     with tqdm(total=args.generations * (len(tried) + 1), desc="generations", leave=False, disable=None) as bar:
         for each, known_costs in zip(tried, known, strict=True):
             k = [point for _, point in points[:1]]  # that of the first structure, which the others contain

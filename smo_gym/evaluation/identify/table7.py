@@ -160,8 +160,6 @@ def structures(scenario: Scenario) -> list[Structure]:
         Structure(scenario, "arms on different plants", apart=True),
         Structure(scenario, "starts scatter, U(-s, s)", K | SPREAD),
         Structure(scenario, "every row at one level", K | LEVEL),
-        Structure(scenario, "one level, slopes, off the reference", K | LEVEL | SLOPES | START, apart=True),
-        Structure(scenario, "scattered starts, slopes, off the reference", K | SPREAD | SLOPES | START, apart=True),
     ]
 
 
