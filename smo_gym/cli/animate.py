@@ -33,7 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--out", type=Path, default=Path("animation.gif"), metavar="FILE", help=".gif or .webp (default animation.gif)")
     args = parser.parse_args(arguments)
     settings = place.controllers[choice("controller", args.controller, place.controllers)]
-    start = place.initial_states.value[choice("case", args.case, place.initial_states.value)]
+    start = place.starts(args.controller)[choice("case", args.case, place.initial_states.value)]
     encode = recording.encoder(choice("kind of file", args.out.suffix, (".gif", ".webp")))
     number("--seconds", args.seconds, above=recording.BETWEEN[args.out.suffix], below=recording.LONGEST)
     files.prepare(args.out.parent, names=[args.out.name])

@@ -3,6 +3,9 @@
     smo-gym identify                        # LQR weights (R = 1) and observer slopes: Table 5's LQR cells
     smo-gym identify --target regulation    # SMC's k1..k4 and slope, Table 4's x(0): Tables 4 and 5
     smo-gym identify --target tracking      # SMC's k1..k4 of tracking: Table 7's averages
+    smo-gym identify --target level         # Table 5's level by its likelihood, LQR's gain with its uncertainty
+    smo-gym identify --target rivals        # equation (26) beside (34): two cases of Table 5 predict the others
+    smo-gym identify --target structures    # what may stand behind Table 7's scatter
 
 CMA-ES from random starts; then from the best point under each hypothesis to reject. The state is saved after every
 generation: run the same command again to go on after an interruption. Writes report.md and report.json. Needs the extra
@@ -28,9 +31,8 @@ from ..evaluation.identify.unprinted import Lqr, Regulation, Tracking
 from ..validation import short
 from .arguments import Parser, whole
 from .entry import Stop, command
+from .likelihoods import LIKELIHOODS, STATE, Costs, Report, Save, damaged
 
-STATE = "state.json"
-Costs = Sequence[Sequence[float]]
 FACTORS = (0.8, 0.9, 1.1, 1.25)
 
 
@@ -39,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Search, or go on searching, and report; 0 when all went well, 2 for a bad argument, 130 when interrupted."""
     parser = Parser("identify", __doc__)
     add = parser.add_argument
-    add("--target", choices=tuple(PROBLEMS), default="lqr", help="default %(default)s")
+    add("--target", choices=(*PROBLEMS, *LIKELIHOODS), default="lqr", help="default %(default)s")
     add("--restarts", type=whole(1), default=2, metavar="N", help="random starts (default 2)")
     add("--generations", type=whole(1), default=80, metavar="N", help="of each search (default 80)")
     add("--refit", type=whole(0), default=10, metavar="N", help="generations for each rejected hypothesis (default 10)")
@@ -47,26 +49,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--out", type=Path, default=Path("identification"), metavar="DIR", help="default %(default)s")
     args = parser.parse_args(arguments)
     plan = {name: getattr(args, name) for name in ("target", "restarts", "generations", "refit", "seed")}
-    problem = PROBLEMS[args.target]()
     with files.claimed(args.out, [STATE, "report.md", "report.json"]) as out:
         costs = resume(out / STATE, plan)
-        searches = begun(args, problem, costs, out / STATE)
 
-        def save() -> None:
+        def save(searches: Sequence[Search]) -> None:
             state = {"plan": plan, "costs": [search.costs for search in searches]}
             files.write(out / STATE, json.dumps(state) + "\n")
 
         try:
-            search_on(args, problem, searches, save)
+            text, data = LIKELIHOODS.get(args.target, unprinted)(args, costs, save)
         except KeyboardInterrupt:
             raise Stop(f"interrupted; the same command goes on from {out / STATE}") from None
-        text, data = report(problem, searches)
         files.write_set(out, {"report.md": text, "report.json": json.dumps(data, indent=1) + "\n"})
     print(text)
     return 0
 
 
-def search_on(args: Namespace, problem: Problem, searches: list[Search], save: Callable[[], None]) -> None:
+def unprinted(args: Namespace, costs: Sequence[Costs], save: Save) -> Report:
+    """What is not printed, from random starts, and the hypotheses to reject."""
+    problem = PROBLEMS[args.target]()
+    searches = begun(args, problem, costs)
+    search_on(args, problem, searches, save)
+    return report(problem, searches)
+
+
+def search_on(args: Namespace, problem: Problem, searches: list[Search], save: Save) -> None:
     """All generations that are left, and the rejected hypotheses from the best point; saved after each."""
     total = args.restarts * args.generations + args.refit * len(problem.alternatives)
     done = sum(search.generations for search in searches)
@@ -75,7 +82,7 @@ def search_on(args: Namespace, problem: Problem, searches: list[Search], save: C
         def run(search: Search, generations: int) -> None:
             while search.generations < generations:
                 search.step()
-                save()
+                save(searches)
                 bar.set_postfix_str(f"{search.hypothesis.name}: RMS {100 * search.rms:.1f} %")
                 bar.update()
 
@@ -103,7 +110,7 @@ def rivals(args: Namespace, problem: Problem, searches: Sequence[Search], costs:
     ]
 
 
-def begun(args: Namespace, problem: Problem, costs: Sequence[Costs], path: Path) -> list[Search]:
+def begun(args: Namespace, problem: Problem, costs: Sequence[Costs]) -> list[Search]:
     """The searches, those of an interrupted run where it was stopped.
 
     Raises:
@@ -117,7 +124,7 @@ def begun(args: Namespace, problem: Problem, costs: Sequence[Costs], path: Path)
         searches = [Search(problem, Hypothesis(), args.seed + i, costs=known) for i, known in enumerate(starts)]
         return searches + (rivals(args, problem, searches, costs[n:]) if costs[n:] else [])
     except (ValueError, TypeError) as error:
-        raise ValueError(f"{path} is damaged ({error}): remove it to start anew") from None
+        raise damaged(args, error) from None
 
 
 def resume(path: Path, plan: dict[str, Any]) -> list[Costs]:
@@ -142,7 +149,7 @@ def resume(path: Path, plan: dict[str, Any]) -> list[Costs]:
     return costs
 
 
-def report(problem: Problem, searches: Sequence[Search]) -> tuple[str, dict[str, Any]]:
+def report(problem: Problem, searches: Sequence[Search]) -> Report:
     """What was found, as text and as data."""
     ours = sorted((s for s in searches if s.hypothesis == Hypothesis()), key=lambda s: s.rms)
     best = ours[0]

@@ -49,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.out("robustness")
     args = parser.parse_args(arguments)
     drawings = [f"{FIGURE}.{form}" for form in figures.FORMATS] if args.figure else []
-    place, upright = scenario.named("regulation"), scenario.named("upright")
+    place, upright = scenario.named("regulation").from_one_start(), scenario.named("upright")
     with files.claimed(args.out, (*RESULTS, *drawings)) as out:
         try:
             with store.kept(out) as kept:

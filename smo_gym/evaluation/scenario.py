@@ -36,7 +36,7 @@ from .settings import (
     ReferenceSettings,
     Setting,
     Settings,
-    State,
+    States,
     TheoremSettings,
 )
 
@@ -60,7 +60,7 @@ class Scenario(Settings):
     force_limit: Setting[float | None]
     track_limit: Setting[float | None]
     uncertainty: Setting[Annotated[tuple[Fraction, ...], Field(min_length=1)]]
-    initial_states: Setting[Annotated[dict[Name, State], Field(min_length=1)]]
+    initial_states: Setting[States]
     controllers: Annotated[dict[Name, ControllerSettings], Field(min_length=1)]
     designed: DesignSettings | None = None
     reference: ReferenceSettings | None = None
@@ -95,7 +95,18 @@ class Scenario(Settings):
                 raise ValueError(f"{what}: of the names {', '.join(map(repr, names))} two look the same")
             if len({is_number(name) for name in names if name}) > 1:
                 raise ValueError(f"{what}: of the names {', '.join(map(repr, names))} all or none must be numbers")
+        for name, settings in self.controllers.items():
+            settings.check_starts(name, cases)
         return self
+
+    def starts(self, controller: str) -> dict[str, Four]:
+        """The initial states of a controller's runs by their names: its own where it has them."""
+        return (self.controllers[controller].initial_states or self.initial_states).value
+
+    def from_one_start(self) -> Scenario:
+        """The scenario without controllers' own initial states, to compare them with each other."""
+        alike = {name: each.model_copy(update={"initial_states": None}) for name, each in self.controllers.items()}
+        return self.model_copy(update={"controllers": alike})
 
     def trajectory(self) -> Reference | None:
         """The reference to follow: the shipped one where it answers to these settings, else solved for.
@@ -175,6 +186,8 @@ class Scenario(Settings):
     def with_agent(self, name: str) -> Scenario:
         """The scenario with one controller more, on the estimates of LQR's observer (or the first controller's).
 
+        All begin alike then, as in :meth:`from_one_start`.
+
         Args:
             name: any for :func:`smo_gym.policies.named.load`, also those that a file may not name.
 
@@ -185,7 +198,7 @@ class Scenario(Settings):
         others = list(self.controllers.values())
         like = next((controller for controller in others if controller.law == "lqr"), others[0])
         settings = PolicySettings.model_construct(law="policy", agent=name, observer=like.observer)
-        more = self.model_copy(update={"controllers": {**self.controllers, name: settings}})
+        more = self.model_copy(update={"controllers": {**self.controllers, name: settings}}).from_one_start()
         _try_controller(more, name)
         return more
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar, get_origin
 
 from pydantic import (
@@ -15,6 +16,7 @@ from pydantic import (
     Tag,
     field_serializer,
     field_validator,
+    model_serializer,
     model_validator,
 )
 
@@ -38,6 +40,8 @@ Start = Annotated[
 """Where an estimate begins: a state, or "measured" for [y(0), 0, 0]."""
 Fraction = Annotated[float, Field(ge=0.0, lt=1.0)]
 Name = Annotated[str, Field(max_length=200)]
+States = Annotated[dict[Name, State], Field(min_length=1)]
+"""Initial states by the names of their cases."""
 Horizon = Annotated[float, Field(le=1e5)]
 """Length of a run in s, a day and more at most."""
 LONGEST_PERIOD = 10.0
@@ -131,7 +135,29 @@ class ObserverSettings(Settings):
         )
 
 
-class LqrSettings(Settings):
+class OwnStart(Settings):
+    """Where a controller's runs begin, if not in the scenario's initial states: by the same names, all of them."""
+
+    initial_states: Setting[States] | None = None
+
+    def check_starts(self, controller: str, cases: Collection[str]) -> None:
+        """Whether they are those of a scenario's cases.
+
+        Raises:
+            ValueError: one is missing, or there is another.
+        """
+        own = None if self.initial_states is None else self.initial_states.value
+        if own is not None and {*own} != {*cases}:
+            given, known = (", ".join(map(repr, names)) for names in (own, cases))
+            raise ValueError(f"controllers.{controller}.initial_states: names {given} must be the scenario's, {known}")
+
+    @model_serializer(mode="wrap")
+    def _unsaid(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        told: dict[str, Any] = handler(self)
+        return {name: value for name, value in told.items() if name != "initial_states" or value is not None}
+
+
+class LqrSettings(OwnStart):
     """Settings of LQR, u = -K xhat."""
 
     law: Literal["lqr"]
@@ -144,7 +170,7 @@ class LqrSettings(Settings):
         return LQR(self.K.value, self.wrap.value)
 
 
-class SmcSettings(Settings):
+class SmcSettings(OwnStart):
     """Settings of the sliding mode control, equations (49)-(50)."""
 
     law: Literal["smc"]
@@ -163,7 +189,7 @@ class SmcSettings(Settings):
         )
 
 
-class PolicySettings(Settings):
+class PolicySettings(OwnStart):
     """An agent by its name for :func:`smo_gym.policies.named.load`: of those names, one that runs no code."""
 
     law: Literal["policy"]

@@ -25,6 +25,7 @@ from .draws import deviations, noise
 from .pieces import Keeper, Map, cut
 from .rollout import rollout
 from .scenario import ControllerSettings, Scenario
+from .settings import Four
 from .traces import Traces
 
 TRACED_RUNS = 10
@@ -57,6 +58,11 @@ class Group:
     def settings(self) -> ControllerSettings:
         """The settings of its controller."""
         return self.scenario.controllers[self.controller]
+
+    @property
+    def start(self) -> Four:
+        """The state that its runs begin in."""
+        return self.scenario.starts(self.controller)[self.case]
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +268,7 @@ def _run(
     for group in batch:
         observer: Any = arm(group.arm).observer(group.settings.observer, group.scenario, task)
         for draw in draws[: group.runs]:
-            states.append(group.scenario.initial_states.value[group.case])
+            states.append(group.start)
             plants.append(nominal.perturbed(group.uncertainty * draw).as_array())
             observers.append(observer)
     observed = VectorObserverWrapper(env, observers)

@@ -111,13 +111,14 @@ def rivals() -> list[Contender]:
 
 
 def entered(scenario: Scenario, contenders: Iterable[Contender]) -> Scenario:
-    """The scenario with all contenders' policies.
+    """The scenario with all contenders' policies, in which everyone begins at its initial state.
 
     Raises:
         ValueError: a policy cannot act in it, or it has several initial states.
     """
     if len(scenario.initial_states.value) != 1:
         raise ValueError(f"initial_states={list(scenario.initial_states.value)} must hold one state")
+    scenario = scenario.from_one_start()
     for contender in contenders:
         for name in contender.names:
             scenario = scenario if name in scenario.controllers else scenario.with_agent(name)

@@ -21,6 +21,14 @@ from smo_gym.wrappers import VectorObserverWrapper
         (("gains: {value: lqr", "gains: {value: lqg"), r"unknown column of Table 3 'lqg': did you mean 'lqr'\?"),
         (("[12.0, 12.0]", "[1500, 12.0]"), "too large for these gains"),
         (('{"": [1.0, 1.0, 0.1, 0.01]}', "{}"), "initial_states.value: Dictionary should have at least 1 item"),
+        (
+            ("law: lqr", "law: lqr\n    initial_states: {value: {far: [1, 1, 0, 0]}, source: chosen}"),
+            r"controllers\.lqr\.initial_states: names 'far' must be the scenario's, ''",
+        ),
+        (
+            ("law: lqr", "law: lqr\n    initial_states: {value: {'': [1, 1, 0]}, source: chosen}"),
+            r"controllers\.lqr\.lqr\.initial_states\.value\.",
+        ),
         (('table: "4"', "extends: bad.yaml"), "extends itself"),
         (('table: "4"', "extends: 5"), "extends=5 must be the name of a file"),
         (('table: "4"', ""), "table: Field required"),

@@ -159,6 +159,9 @@ def test_whatever_a_group_depends_on_changes_its_key(tmp_path, monkeypatch):
     keys.append(kept.key(group, 0, None))
     assert len({*keys}) == len(keys)
     assert None not in keys
+    own = {"value": dict.fromkeys(group.scenario.initial_states.value, (0.1, 0.2, 0.3, 0.4)), "source": "chosen"}
+    elsewhere = group.scenario.changed(controllers={"lqr": {**dict(group.settings), "initial_states": own}})
+    assert kept.key(replace(group, scenario=elsewhere), 0, None) not in keys
     # the other controllers of its scenario are not among it
     monkeypatch.undo()
     alone = group.scenario.model_copy(update={"controllers": {"lqr": group.settings}})

@@ -14,6 +14,22 @@ from smo_gym.plant import STATE_NAMES
 K = [7.234, -4.132, 11.075, -1.025]
 
 
+def test_a_controller_may_begin_elsewhere(small):
+    own = {"": (0.5, 0.2, 0.0, 0.0)}
+    lqr = small.controllers["lqr"]
+    apart = small.changed(controllers={"lqr": lqr, "near": lqr.changed(initial_states=own)})
+
+    def seen(place, name):
+        groups = study.groups([place], [name], ["with"], 2)
+        return [(o.group.start, *o.metrics["mse_h"]) for o in study.measure(groups, 0)]
+
+    assert seen(apart, "near") == seen(small.changed(initial_states=own), "lqr")
+    assert seen(apart, "near")[0][0] == own[""]
+    assert seen(apart, "lqr") == seen(small, "lqr") == seen(apart.from_one_start(), "near")
+    # who enters meets the others on equal terms
+    assert apart.with_agent("ppo").starts("near") == small.initial_states.value
+
+
 def test_a_study_is_what_single_runs_give(small):
     groups = study.groups([small], ["lqr"], ["without", "with", "oracle"], 3)
     assert [(g.uncertainty, g.arm, g.runs) for g in groups][:4] == [

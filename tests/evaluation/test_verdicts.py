@@ -69,7 +69,7 @@ def test_the_last_bit_of_the_start_moves_single_smc_runs(name, least):
     chosen = scenario.named(name)
     rng = np.random.default_rng(0)
     plants = np.array([CartPendulum().draw(0.2, rng).as_array() for _ in range(40)])
-    (start,) = chosen.initial_states.value.values()
+    (start,) = chosen.starts("smc").values()
     moved = [start[0] + 1e-15, *start[1:]]
     a, b = (runs(chosen, "smc", x0, plants).metrics for x0 in (start, moved))
     for metric in ("mse_h", "mse_theta"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -31,10 +31,15 @@ class Hypothesis:
 class Problem(Protocol):
     """Published numbers as a function of unprinted settings."""
 
-    parameters: ClassVar[dict[str, tuple[float, float]]]
-    """Bounds of each parameter by its name; all are searched on a logarithmic scale."""
-    alternatives: ClassVar[tuple[Hypothesis, ...]]
-    """Hypotheses to reject, each by a search of its own."""
+    @property
+    def parameters(self) -> dict[str, tuple[float, float]]:
+        """Bounds of each parameter by its name; all are searched on a logarithmic scale."""
+        ...
+
+    @property
+    def alternatives(self) -> tuple[Hypothesis, ...]:
+        """Hypotheses to reject, each by a search of its own."""
+        ...
 
     def labels(self) -> list[str]:
         """Names of the numbers that are fitted, in their order."""

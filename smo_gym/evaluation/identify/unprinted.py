@@ -1,102 +1,32 @@
 """Three problems of identification, one for each block of identified settings in ``configs/``.
 
-One generation of the optimiser is a batch or two: every candidate takes the slots of its starts, arms and plants.
+One generation of the optimiser is a batch or two.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
-import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
 
-from ...article import WITH, Cell, published
-from ...controllers import LQR, Agent, SlidingModeController
+from ...article import Cell, published
+from ...controllers import LQR, SlidingModeController
 from ...observers import SlidingModeObserver
 from ...plant import CartPendulum
 from ...typing import Array
-from ...wrappers import VectorObserverWrapper
 from ..arms import PRINTED
-from ..draws import deviations as draws
-from ..rollout import rollout
 from ..scenario import Scenario
 from ..settings import LqrSettings, SmcSettings
+from .runs import STATES, mse, random_plants
 from .search import Hypothesis
 
-STATES = ("h", "theta")
 # A run that diverges counts as a hundredfold MSE, so that the search leads away from it.
 _DIVERGED = math.log(100.0)
 
 _START = Hypothesis("xhat(0) = x(0)", estimate_starts_at_truth=True)
 _HORIZONS = tuple(Hypothesis(f"horizon {s:g} s", horizon=s) for s in (20.0, 30.0, 40.0))
-
-
-def _mse(
-    scenario: Scenario,
-    hypothesis: Hypothesis,
-    observers: Sequence[SlidingModeObserver],
-    agent: Callable[[int], Agent],
-    starts: Array,
-    plants: Array,
-) -> Array:
-    """Mean square errors (candidates, starts, arms, plants, states), NaN where a run failed.
-
-    Args:
-        scenario: gives the environment.
-        hypothesis: what is taken for granted instead of the scenario's settings.
-        observers: one a candidate.
-        agent: of all candidates, for so many consecutive slots each.
-        starts: x(0), (candidates, starts, 4).
-        plants: [M_c, m, l, g], (plants, 4).
-    """
-    if hypothesis.horizon is not None:
-        scenario = scenario.changed(horizon=hypothesis.horizon)
-    if hypothesis.elements is not None and scenario.reference is not None:
-        scenario = scenario.changed(reference=scenario.reference.changed(elements=hypothesis.elements))
-    slots = [
-        (
-            replace(
-                observer,
-                compensation=arm == WITH,
-                time_constant=hypothesis.time_constant,
-                xhat0=tuple(x0) if hypothesis.estimate_starts_at_truth else observer.xhat0,
-            ),
-            x0,
-            plant,
-        )
-        for observer, cases in zip(observers, starts, strict=True)
-        for x0 in cases
-        for arm in PRINTED
-        for plant in plants
-    ]
-    options: dict[str, Any] = {**scenario.environment_options, "track_limit": 50.0}
-    if scenario.reference is None:
-        options["params"] = CartPendulum(gravity=hypothesis.gravity)
-    env: VectorEnv[Array, Array, Array] = gymnasium.make_vec(
-        scenario.environment, len(slots), autoreset_mode=AutoresetMode.DISABLED, **options
-    )
-    each, states, params = zip(*slots, strict=True)
-    m, cases, _ = starts.shape
-    found = rollout(
-        VectorObserverWrapper(env, each),
-        agent(len(slots) // m),
-        options={"state": np.array(states), "params": np.array(params)},
-    )
-    errors = np.stack([found.metrics[f"mse_{s}"] for s in STATES], axis=-1)
-    errors[found.failed] = np.nan
-    return errors.reshape(m, cases, len(PRINTED), len(plants), len(STATES))
-
-
-def _plants(scenario: Scenario, each: int, gravity: float = -9.8) -> Array:
-    """``each`` random plants at each of the scenario's levels, (levels * each, 4)."""
-    model = CartPendulum(gravity=gravity)
-    levels = scenario.uncertainty.value
-    deltas = np.concatenate([level * draws(i, each) for i, level in enumerate(levels)])
-    return np.array([model.perturbed(delta).as_array() for delta in deltas])
 
 
 def _against(measured: Array, printed: Sequence[Any]) -> Array:
@@ -177,7 +107,7 @@ class Lqr:
         K = np.array([LQR.design(v[:4], 1.0, model).K[0] for v in values])
         observers = [SlidingModeObserver("lqr", slopes=(v[4], v[5]), model=model) for v in values]
         starts = np.repeat([list(self._cases.values())], len(values), axis=0)
-        mse = _mse(
+        found = mse(
             self.scenario,
             hypothesis,
             observers,
@@ -185,7 +115,7 @@ class Lqr:
             starts,
             model.as_array()[None],
         )
-        return _against(mse.mean(axis=3), self._cells)
+        return _against(found.mean(axis=3), self._cells)
 
 
 class Regulation:
@@ -229,10 +159,12 @@ class Regulation:
             )
 
         cases = np.repeat([list(self._cases.values())], len(values), axis=0)
-        x0, plants = values[:, None, 5:], _plants(self.table4, 1)
-        table5 = _mse(self.table5, hypothesis, smc_observers, law, cases, _plants(self.table5, 6))
-        with_smc = _mse(self.table4, hypothesis, smc_observers, law, x0, plants)
-        with_lqr = _mse(self.table4, hypothesis, lqr_observers, lambda n: lqr.build(dt), x0, plants)
+        x0, plants = values[:, None, 5:], random_plants(self.table4.uncertainty.value, 1)
+        table5 = mse(
+            self.table5, hypothesis, smc_observers, law, cases, random_plants(self.table5.uncertainty.value, 6)
+        )
+        with_smc = mse(self.table4, hypothesis, smc_observers, law, x0, plants)
+        with_lqr = mse(self.table4, hypothesis, lqr_observers, lambda n: lqr.build(dt), x0, plants)
         table4 = np.stack([with_smc.mean(axis=(1, 3)), with_lqr.mean(axis=(1, 3))], axis=1)
         parts = [_against(table5.mean(axis=3), self._cells), _against(table4, self._averages)]
         return np.concatenate(parts, axis=1)
@@ -264,12 +196,12 @@ class Tracking:
         assert isinstance(settings, SmcSettings)
         k = 10.0 ** np.asarray(points)
         (x0,) = self.scenario.initial_states.value.values()
-        mse = _mse(
+        found = mse(
             self.scenario,
             hypothesis,
             [settings.observer.build(True)] * len(k),
             lambda n: SlidingModeController(np.repeat(k, n, axis=0), dt, settings.slope.value, wrap=False),
             np.tile(x0, (len(k), 1, 1)),
-            _plants(self.scenario, 4),
+            random_plants(self.scenario.uncertainty.value, 4),
         )
-        return _against(mse.mean(axis=(1, 3)), self._averages)
+        return _against(found.mean(axis=(1, 3)), self._averages)

@@ -203,8 +203,7 @@ def _said(shown: Sequence[Outcome]) -> str:
 
 
 def _state(group: Group) -> str:
-    values = group.scenario.initial_states.value[group.case]
-    return f"[{', '.join(f'{value:g}' for value in values)}]".replace("-", "−").replace(" ", "\N{NO-BREAK SPACE}")
+    return f"[{', '.join(f'{value:g}' for value in group.start)}]".replace("-", "−").replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _bars(plan: Plan, outcomes: Iterable[Outcome], results: Iterable[Result]) -> tuple[Figure, str]:

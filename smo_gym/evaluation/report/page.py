@@ -128,7 +128,7 @@ def _group(outcome: Outcome, where: Mapping[str, int | None]) -> dict[str, Any]:
         "law": group.settings.law,
         "uncertainty": f"{100 * group.uncertainty:.10g} %",
         "case": formats.line(group.case),
-        "start": [float(value) for value in group.scenario.initial_states.value[group.case]],
+        "start": [float(value) for value in group.start],
         "arm": group.arm,
         "period": float(traces.time[1]) if len(traces.time) > 1 else 1.0,
         "failed": outcome.failed[shown].tolist(),
