@@ -116,9 +116,9 @@ def promised(runs: int, seed: int) -> int:
         lines.append((name, f"{L:g}", margins, f"{kept} of {inside.sum()}", f"{found.largest[inside].max():.2g}"))
     print(
         f"Upright, true state, {1e3 * law_promise.PERIOD:g} ms, |theta(0)| <= {law_promise.LEAN:g} rad, sine and "
-        f"viscous friction;\ninside: runs with |d'| <= {law_promise.BOUND:g} m/s³ and the force within its limit\n"
+        f"viscous friction;\nsigma in runs with |d'| <= {law_promise.BOUND:g} m/s³ and the force within its limit\n"
     )
-    header = ("design", "L, m/s³", "conditions", "sigma kept at 0, inside", "largest sigma, m/s")
+    header = ("design", "L, m/s³", "conditions", "kept at 0", "largest, m/s")
     print(tabulate(lines, header, "simple", disable_numparse=True))
     return 0
 

@@ -51,6 +51,6 @@ def evidence(seed: int, store: Store | None, told: Callable[[int], object]) -> E
     told(1)
     along = {name: traced(article, name, len(article.initial_states.value), 0.0, seed, 1) for name in ("lqr", "smc")}
     told(1)
-    sliding = traced(scenario.named("regulation"), "smc", SLIDING, LEVEL, seed, EVERY)
+    sliding = traced(scenario.named("regulation").from_one_start(), "smc", SLIDING, LEVEL, seed, EVERY)
     told(1)
     return Evidence(converged, coarse, of_exact, along, sliding)

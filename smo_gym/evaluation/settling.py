@@ -93,7 +93,7 @@ class Column:
 
     def place(self, gains: Mapping[str, Any] | None = None) -> Scenario:
         """Its scenario, with the observer's start and, where some are given, other gains."""
-        place = named(self.scenario)
+        place = named(self.scenario).from_one_start()
         settings = place.controllers[self.controller]
         observer = settings.observer
         if self.start == "measured":

@@ -37,7 +37,10 @@ _WORST = math.log(1e9)
 
 @dataclass(frozen=True)
 class Structure:
-    """Table 7 as a function of some parameters; the others are as in ``configs/``. A problem of :class:`.Search`."""
+    """Table 7 as a function of some parameters; the others are as in ``configs/``.
+
+    One of the problems of :class:`~smo_gym.evaluation.identify.search.Search`.
+    """
 
     scenario: Scenario
     name: str
