@@ -12,7 +12,7 @@ import numpy as np
 from .kernels import inlined
 from .kernels.batch import LANES
 from .kernels.blocks import ALIVE, FAILED, FORCE, U, at, block, offsets, put
-from .kernels.elementary import rounded
+from .kernels.elementary import rounded, within
 from .loop import Part, columns
 from .typing import Array
 from .validation import instance, number, short, switch, whole
@@ -46,12 +46,6 @@ def limited(n: int, limit: float) -> Part:
     return Part(columns(n, limit, 0.0), act=_limited)
 
 
-@inlined
-def _within(x: float, low: float, high: float) -> float:
-    x = low if x < low else x
-    return high if x > high else x
-
-
 @block
 def _ask(signals: Array, own: Array, lanes: int) -> None:
     resolution, most = own[RESOLUTION * LANES], own[MOST * LANES]
@@ -67,7 +61,7 @@ def _ask(signals: Array, own: Array, lanes: int) -> None:
         put(own, REFUSED, i, wanted if alive and not fine else at(own, REFUSED, i))
     if resolution > 0.0:
         for i in range(lanes):
-            put(own, COMMAND, i, _within(resolution * rounded(at(own, COMMAND, i) / resolution), -most, most))
+            put(own, COMMAND, i, within(resolution * rounded(at(own, COMMAND, i) / resolution), -most, most))
 
 
 @inlined
@@ -75,7 +69,7 @@ def _skip_dead_zone(signals: Array, own: Array, lanes: int) -> None:
     zone = own[DEAD_ZONE * LANES]
     for i in range(lanes):
         force = at(own, COMMAND, i)
-        put(signals, FORCE, i, force - _within(force, -zone, zone))
+        put(signals, FORCE, i, force - within(force, -zone, zone))
 
 
 @inlined
@@ -95,7 +89,7 @@ def _climb(signals: Array, own: Array, lanes: int) -> None:
     step = own[STEP * LANES]
     for i in range(lanes):
         before = at(own, RAMP, i)
-        force = _within(at(signals, FORCE, i), before - step, before + step)
+        force = within(at(signals, FORCE, i), before - step, before + step)
         put(own, RAMP, i, force)
         put(signals, FORCE, i, force)
 

@@ -9,9 +9,11 @@ Prints a part of it, and writes all of it to --out: mean squares, force and fail
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import astuple, fields
 from functools import partial
+from importlib.util import find_spec
 
 from tabulate import tabulate
 from tqdm import tqdm
@@ -69,6 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         table_page.check()
     laws = law_settings.named()
     periods, names = [float(period) for period in args.period], [*(args.law or laws.laws)]
+    if args.law is None and not find_spec("osqp"):
+        names = [name for name in names if laws[name].law != "mpc"]
+        print('MPC is left out: it needs the extra mpc, pip install "smo_gym[mpc]"', file=sys.stderr)
     wanted = cells(laws, names, args.observer, args.case, args.sensor, periods, args.runs, args.seed, args.outside)
     if not wanted:
         raise ValueError(f"--law {' '.join(args.law or [])} has no gains for --case {' '.join(args.case)} there")

@@ -6,6 +6,7 @@ import math
 
 from ..kernels.batch import LANES
 from ..kernels.blocks import XHAT, Block, U, at, four, offsets, put
+from ..kernels.elementary import within
 from ..kernels.modelling import Params, Rhs, for_each_model
 from ..kernels.reaching import Hold, Reach
 from ..kernels.rk4 import rk4
@@ -36,12 +37,12 @@ def _act(rhs: Rhs, params: Params, nominal: Block, rows: int, reach: Reach, hold
                 at(own, K_2, i),
             )
             p, z = params(own, MODEL, i), at(own, Z, i)
-            u_0 = min(max(at(signals, U, i), -limit), limit)
+            u_0 = within(at(signals, U, i), -limit, limit)
             gain = rhs(x, 0.0, (u_0 + 1.0,) + p)[2] - rhs(x, 0.0, (u_0,) + p)[2]  # noqa: RUF005
             predicted = at(own, PREDICTED, i) if at(own, BEGUN, i) > 0.0 else x[2]
             v, z_new = reach(x[2] - predicted, z, h, k_1, k_2)
             wanted = u_0 + v / gain
-            u = min(max(wanted, -limit), limit)
+            u = within(wanted, -limit, limit)
             put(own, Z, i, z_new if u == wanted else hold(z, gain * (u - u_0), h, k_2))
             put(own, PREDICTED, i, predicted + rk4(rhs, x, (u_0,) + p, h)[2] - x[2])  # noqa: RUF005
             put(own, BEGUN, i, 1.0)

@@ -7,6 +7,7 @@ import math
 from numpy.typing import ArrayLike
 
 from ..kernels.blocks import XD, Block, U, at, error, four, offsets, put
+from ..kernels.elementary import within
 from ..kernels.modelling import Params, Rhs, for_each_model
 from ..loop import Part, columns
 from ..models import Model
@@ -35,7 +36,7 @@ def _act(rhs: Rhs, params: Params, ahead: bool) -> Block:
             # an integral that would drive a force at its limit further out stays as it is
             outwards = abs(u) > limit and u * k_i * e[0] < 0.0
             put(own, INTEGRAL, i, integral if outwards else integral + h * e[0])
-            put(signals, U, i, min(max(u, -limit), limit))
+            put(signals, U, i, within(u, -limit, limit))
 
     return act
 

@@ -7,7 +7,7 @@ from ..article import SMC_GAINS
 from ..kernels import inlined
 from ..kernels.blocks import XHAT, U, at, block, error, four, offsets, put
 from ..kernels.cart_pendulum import plant
-from ..kernels.elementary import rounded, sincos, tanh
+from ..kernels.elementary import rounded, sincos, tanh, within
 from ..loop import Part, columns
 from ..plant import CartPendulum
 from ..typing import Array, State
@@ -52,7 +52,7 @@ def _implicit(signals: Array, own: Array, lanes: int) -> None:
         odd = 1.0 if gain > 0.0 else 0.0
         away = ahead - epsilon * (2.0 * rounded(0.5 * (ahead / epsilon - odd)) + odd)
         needed = h * abs(gain) * most
-        share = min(max(away / needed, -1.0), 1.0) if needed > 0.0 else 0.0
+        share = 0.0 if needed == 0.0 else within(away / needed, -1.0, 1.0)
         put(signals, U, i, -most * share if gain > 0.0 else most * share)
         put(own, INTEGRAL, i, integral)
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..kernels import inlined
 from ..kernels.blocks import XD, XHAT, Block, U, at, error, four, offsets, put
+from ..kernels.elementary import within
 from ..kernels.modelling import Params, Rhs, for_each_model
 from ..kernels.reaching import Hold, Reach
 from ..loop import Part, columns
@@ -43,7 +44,7 @@ def _act(rhs: Rhs, params: Params, reach: Reach, hold: Hold) -> Block:
             rest -= (s_d - at(own, BEFORE, i)) / h if at(own, BEGUN, i) > 0.0 else 0.0
             v, z_new = reach(s, z, h, k_1, k_2)
             wanted = (v - rest) / gain
-            u = min(max(wanted, -limit), limit)
+            u = within(wanted, -limit, limit)
             put(own, Z, i, z_new if u == wanted else hold(z, rest + gain * u, h, k_2))
             put(own, BEFORE, i, s_d)
             put(own, BEGUN, i, 1.0)

@@ -151,3 +151,10 @@ def cube_root_above(x: float) -> float:
     third += third >> 4
     third += third >> 8
     return _from_bits(third + _TWO_THIRDS_OF_ONE)
+
+
+@inlined
+def within(x: float, low: float, high: float) -> float:
+    """The value next to x in [low, high]; NaN stays NaN, so that whoever looks for it finds it."""
+    x = low if x < low else x
+    return high if x > high else x

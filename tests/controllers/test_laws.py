@@ -74,6 +74,14 @@ def test_a_law_that_is_asked_gives_the_bits_of_the_compiled_loop(law):
     assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a)
 
 
+@pytest.mark.parametrize("law", ALL)
+def test_an_estimate_that_is_not_finite_is_not_hidden_by_the_limit(law):
+    """It gives a force that is not finite, which the environment refuses, and no other slot's."""
+    u, _ = ALL[law]().predict(np.array([[0.1, 0.1, 0.1, 0.1, 0.0, math.nan], [0.1, 0.1, 0.1, 0.1, 0.0, 0.0]]))
+    assert np.isnan(u[0, 0])
+    assert np.isfinite(u[1, 0])
+
+
 def test_two_slots_of_a_law_know_nothing_of_each_other():
     law = ALL["integral sliding mode"]()
     together = metrics(law, n=3)
