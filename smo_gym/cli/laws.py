@@ -2,6 +2,7 @@
 
     smo-gym laws                                        # everything; half an hour on two cores
     smo-gym laws --case upright --observer ekf --sensor noise --period 0.02
+    smo-gym laws --front --figure --workers 2           # tuned for smoother and for rougher forces; ten minutes
     smo-gym laws --promise --runs 1000                  # where the theorem's conditions hold, and where one is broken
 
 Prints a part of it, and writes all of it to --out: mean squares, force and failures, with 95 % intervals over runs.
@@ -15,11 +16,10 @@ from dataclasses import astuple, fields
 from functools import partial
 from importlib.util import find_spec
 
-from tabulate import tabulate
 from tqdm import tqdm
 
 from .. import files
-from ..evaluation import formats, law_promise, law_settings
+from ..evaluation import formats, law_settings
 from ..evaluation.law_cases import ESTIMATES, LEARNING, PERIODS, SENSORS, cases
 from ..evaluation.law_settings import Laws
 from ..evaluation.law_table import Cell, Row, cells, measured, row
@@ -30,6 +30,7 @@ from ..typing import Array
 from . import computing
 from .arguments import Parser, one_of, several, versions
 from .entry import command, typed
+from .laws_besides import front, promised
 
 RESULTS = ("laws.csv", "laws.md")
 FIGURE, PAGE = "laws", "laws.html"
@@ -57,6 +58,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         action="store_true",
         help="plants uncertain by 35 %% and another disturbance, which nothing was tuned on",
     )
+    parser.add_argument("--front", action="store_true", help="instead, what a smoother force costs each law")
     parser.add_argument("--promise", action="store_true", help="instead, what the integral sliding mode promises")
     parser.runs(200, "random plants in each cell")
     parser.seed("the random plants, starts and noise")
@@ -70,6 +72,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if args.report:
         table_page.check()
     laws = law_settings.named()
+    if args.front:
+        return front(args, laws)
     periods, names = [float(period) for period in args.period], [*(args.law or laws.laws)]
     if args.law is None and not find_spec("osqp"):
         names = [name for name in names if laws[name].law != "mpc"]
@@ -107,24 +111,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         finally:  # what cannot be written can be read at least
             print(table_page.text(_tables(laws, ordered), "simple"))
     print(f"\nresults are in {args.out}")
-    return 0
-
-
-def promised(runs: int, seed: int) -> int:
-    """Print in how many runs sigma stays at 0, where the theorem's conditions hold and where one is broken."""
-    lines = []
-    for name, L in law_promise.DESIGNS.items():
-        found = law_promise.promise(L, runs, seed)
-        margins = "; ".join(f"{each.name} by {each.margin:+.3g}" for each in found.conditions)
-        inside = found.inside
-        kept = int((found.kept & inside).sum())
-        lines.append((name, f"{L:g}", margins, f"{kept} of {inside.sum()}", f"{found.largest[inside].max():.2g}"))
-    print(
-        f"Upright, true state, {1e3 * law_promise.PERIOD:g} ms, |theta(0)| <= {law_promise.LEAN:g} rad, sine and "
-        f"viscous friction;\nsigma in runs with |d'| <= {law_promise.BOUND:g} m/s³ and the force within its limit\n"
-    )
-    header = ("design", "L, m/s³", "conditions", "kept at 0", "largest, m/s")
-    print(tabulate(lines, header, "simple", disable_numparse=True))
     return 0
 
 

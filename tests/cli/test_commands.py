@@ -25,6 +25,7 @@ SHARED = {
     "computing",
     "console",
     "entry",
+    "laws_besides",
     "narrow",
     "processes",
     "progress",

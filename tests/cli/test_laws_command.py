@@ -5,6 +5,7 @@ import csv
 import pytest
 
 from smo_gym.cli import laws, tune
+from smo_gym.evaluation import law_settings
 
 COLUMNS = (
     "case,disturbed,law,observer,start,sensor,control_period,mse_h,mse_theta,iae_h,iae_theta,effort,total_variation,"
@@ -83,3 +84,27 @@ def test_tuning_writes_settings_with_what_it_found(tmp_path, capsys):
 def test_tuning_refuses_what_is_not_tuned(arguments, told, tmp_path, capsys):
     assert tune.main(["laws", *arguments, "--out", str(tmp_path / "out")]) == 2
     assert told in capsys.readouterr().err
+
+
+def test_a_front_has_the_shipped_numbers_on_it_and_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
+    """Under the family's own weight nothing is searched: those rows are the table's."""
+    few = law_settings.named().model_copy(update={"budget": 2})
+    monkeypatch.setattr(law_settings, "named", lambda: few)
+    out = tmp_path / "front"
+    assert laws.main(["--front", "--law", "linear", "--runs", "3", "--figure", "--out", str(out)]) == 0
+    with (out / "front.csv").open(newline="") as file:
+        found = list(csv.DictReader(file))
+    assert {(row["weight"], row["case"], row["outside"]) for row in found} == {
+        (weight, case, outside)
+        for weight in ("0.02", "0.1", "0.5")
+        for case in ("table-4", "upright")
+        for outside in ("yes", "no")
+    }
+    place = ["--observer", "ekf", "--sensor", "noise", "--period", "0.02", "--case", "table-4"]
+    assert laws.main(["--law", "linear", *place, "--runs", "3", "--out", str(tmp_path / "table")]) == 0
+    (mine,) = (row for row in rows(tmp_path / "table") if row["disturbed"] == "no")
+    (same,) = (r for r in found if (r["weight"], r["case"], r["outside"]) == ("0.1", "table-4", "no"))
+    assert same["mse_h"] == mine["mse_h"]
+    assert (out / "front.png").stat().st_size > 10_000
+    assert laws.main(["--front", "--law", "lqr", "--out", str(tmp_path / "none")]) == 2
+    assert "nothing of it is tuned" in capsys.readouterr().err

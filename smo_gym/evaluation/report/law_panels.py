@@ -82,6 +82,50 @@ def draw(rows: Sequence[Row], titles: Mapping[str, str], kinds: Mapping[str, str
     return figure
 
 
+FRONTS = (
+    ("table-4", "no", "hanging, undisturbed"),
+    ("table-4", "yes", "the same, plants 35 % off"),
+    ("upright", "no", "upright, disturbed"),
+    ("upright", "yes", "the same, 35 %, another force"),
+)
+"""Case, whether it is outside of what was tuned on, and the panel's title."""
+
+
+def draw_front(rows: Sequence[Row], titles: Mapping[str, str], kinds: Mapping[str, str]) -> Figure:
+    """Each law as a line through what it was tuned to, for smoother and for rougher forces; h above theta.
+
+    Args:
+        rows: of :func:`smo_gym.evaluation.law_front.points`.
+        titles: of the laws.
+        kinds: of the laws, keys of :data:`COLOURS`.
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    looks = styles(kinds)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(14.0, 6.0), layout="constrained")
+        grid = figure.subplots(2, len(FRONTS))
+        drawn: dict[str, Any] = {}
+        for column, (case, outside, title) in enumerate(FRONTS):
+            mine = [r for r in rows if (r.case, r.outside) == (case, outside) and r.failures <= MOST_FAILED * r.runs]
+            for panel, name, unit in zip(grid[:, column], ("h", "theta"), ("m²", "rad²"), strict=True):
+                for law in dict.fromkeys(row.law for row in mine):
+                    line = sorted((r.total_variation, getattr(r, f"mse_{name}")) for r in mine if r.law == law)
+                    colour, marker = looks[law]
+                    x, y = zip(*line, strict=True)
+                    (drawn[law],) = panel.plot(x, y, marker=marker, ms=4, lw=1.0, color=colour)
+                panel.set(xscale="log", yscale="log")
+                if column == 0:
+                    panel.set_ylabel(f"MSE of {name}, {unit}")
+            grid[0, column].set_title(title)
+            grid[1, column].set_xlabel("total variation of the force, N")
+        order = [name for name in titles if name in drawn]
+        labels = [titles[name] for name in order]
+        figure.legend([drawn[name] for name in order], labels, loc="outside right center", frameon=False)
+    return figure
+
+
 def _there(rows: Sequence[Row], case: str, disturbed: str) -> list[Row]:
     observers = (PLACE[0], "steady-kalman")
     place = (case, disturbed, *PLACE[1:])
