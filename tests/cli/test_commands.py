@@ -25,6 +25,7 @@ SHARED = {
     "computing",
     "console",
     "entry",
+    "likelihoods",
     "narrow",
     "processes",
     "progress",
