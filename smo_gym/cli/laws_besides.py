@@ -40,7 +40,7 @@ def promised(runs: int, seed: int) -> int:
 
 
 def front(args: argparse.Namespace, laws: Laws) -> int:
-    """Tune each law under several weights of the force's variation, measure it on other plants; 0 when all went well."""
+    """Tune each law under several weights of the force's variation, measure it on other plants; 0 when all is done."""
     wanted = law_front.pieces(laws, [*(args.law or laws.laws)])
     if not wanted:
         raise ValueError(f"--law {' '.join(args.law)}: nothing of it is tuned where fronts are drawn")

@@ -26,6 +26,7 @@ SHARED = {
     "console",
     "entry",
     "laws_besides",
+    "likelihoods",
     "narrow",
     "processes",
     "progress",
