@@ -101,6 +101,7 @@ def draw_front(rows: Sequence[Row], titles: Mapping[str, str], kinds: Mapping[st
     """
     from matplotlib import rc_context
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     looks = styles(kinds)
     with rc_context(STYLE):
@@ -116,6 +117,7 @@ def draw_front(rows: Sequence[Row], titles: Mapping[str, str], kinds: Mapping[st
                     x, y = zip(*line, strict=True)
                     (drawn[law],) = panel.plot(x, y, marker=marker, ms=4, lw=1.0, color=colour)
                 panel.set(xscale="log", yscale="log")
+                panel.xaxis.set_minor_formatter(NullFormatter())
                 if column == 0:
                     panel.set_ylabel(f"MSE of {name}, {unit}")
             grid[0, column].set_title(title)
